@@ -1,0 +1,194 @@
+"""What flight code is given and what it returns: the seams of the loop.
+
+`MEASURED` is the one table of measurement columns; the log row of a tick IS the measurement.  A kernel works
+on the rows (`kernel(rows, k, state)`), a person's own estimator on the `Measurements` over the same row:
+
+>>> m.imu.gyro_b_rad_s, m.imu.dt_s          # always there
+>>> m.gps                                   # None, or the fix that arrived in this tick
+"""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Column(NamedTuple):
+    """One column of a log: its name (quantity, frame, unit), shape, and meaning; `integer` for flags and counts."""
+
+    name: str
+    shape: tuple[int, ...]
+    meaning: str
+    integer: bool = False
+
+
+def dtype_of(columns: tuple[Column, ...]) -> np.dtype[Any]:
+    """Structured dtype of `columns`, every element 8 bytes wide, so that rows are aligned for the kernels."""
+    return np.dtype([(c.name, "i8" if c.integer else "f8", c.shape) for c in columns], align=True)
+
+
+MEASURED = (
+    Column("t_s", (), "end of the sample interval, since power-up, by the clock aboard"),
+    Column("dt_s", (), "length of the sample interval; may jitter"),
+    Column("gyro_b_rad_s", (3,), "mean angular rate over the interval, as the gyro reports it"),
+    Column("force_b_m_s2", (3,), "mean specific force over the interval; level at rest (0, 0, -9.8)"),
+    Column("gps_new", (), "1 where a fix arrived in this tick", integer=True),
+    Column("gps_valid", (), "1 once a fix has arrived; the columns below hold the last one", integer=True),
+    Column("gps_t_s", (), "time at which the fix was true, the receiver's own stamp"),
+    Column("gps_p_e_m", (3,), "reported position, relative to the launch point"),
+    Column("gps_v_e_m_s", (3,), "reported velocity over the ground"),
+    Column("gps_course_rad", (), "reported course over ground, from north over east, 0..2 pi"),
+    Column("gps_speed_m_s", (), "reported ground speed, horizontal"),
+    Column("mag_new", (), "1 where a magnetometer sample arrived", integer=True),
+    Column("mag_b_ut", (3,), "magnetic field, microtesla"),
+    Column("air_new", (), "1 where an air-data sample arrived", integer=True),
+    Column("airspeed_m_s", (), "measured airspeed"),
+    Column("baro_height_m", (), "barometric height above the launch point"),
+)
+MEASURED_DTYPE = dtype_of(MEASURED)
+
+
+class ImuSample(NamedTuple):
+    """One inertial sample: means over the interval of `dt_s` that ends at `t_s`.
+
+    gyro_b_rad_s : shape (3,)   force_b_m_s2 : shape (3,), specific force (acceleration minus gravity)
+    """
+
+    t_s: float
+    dt_s: float
+    gyro_b_rad_s: Array
+    force_b_m_s2: Array
+
+
+class GpsFix(NamedTuple):
+    """One GPS report as it arrives: filtered and late.  `t_s` is when it was true.
+
+    p_e_m, v_e_m_s : shape (3,), north-east-down   course_rad : 0..2 pi   speed_m_s : horizontal
+    """
+
+    t_s: float
+    p_e_m: Array
+    v_e_m_s: Array
+    course_rad: float
+    speed_m_s: float
+
+
+class MagSample(NamedTuple):
+    """One magnetometer sample, shape (3,), microtesla, body axes."""
+
+    field_b_ut: Array
+
+
+class AirData(NamedTuple):
+    """One air-data sample: airspeed and barometric height above the launch point."""
+
+    airspeed_m_s: float
+    height_m: float
+
+
+class Measurements(NamedTuple):
+    """All that is known aboard in one tick: a view of row `k` of the measured log (read-only, never overwritten).
+
+    A compiled estimator hands `rows` and `k` to its kernel; anyone else reads `imu`, `gps`, `mag`, `air`.
+    """
+
+    rows: NDArray[np.void]
+    k: int
+
+    @classmethod
+    def of(
+        cls, imu: ImuSample, gps: GpsFix | None = None, mag: MagSample | None = None, air: AirData | None = None
+    ) -> "Measurements":
+        """Measurements from single samples: for tests, notebooks and logs of one's own."""
+        rows = np.zeros(1, MEASURED_DTYPE)
+        row = rows[0]
+        row["t_s"], row["dt_s"], row["gyro_b_rad_s"], row["force_b_m_s2"] = imu
+        if gps is not None:
+            row["gps_new"] = row["gps_valid"] = 1
+            row["gps_t_s"], row["gps_p_e_m"], row["gps_v_e_m_s"] = gps[:3]
+            row["gps_course_rad"], row["gps_speed_m_s"] = gps[3:]
+        if mag is not None:
+            row["mag_new"], row["mag_b_ut"] = 1, mag.field_b_ut
+        if air is not None:
+            row["air_new"], row["airspeed_m_s"], row["baro_height_m"] = 1, air.airspeed_m_s, air.height_m
+        rows.flags.writeable = False
+        return cls(rows, 0)
+
+    @property
+    def imu(self) -> ImuSample:
+        row = self.rows[self.k]
+        return ImuSample(float(row["t_s"]), float(row["dt_s"]), row["gyro_b_rad_s"], row["force_b_m_s2"])
+
+    @property
+    def gps(self) -> GpsFix | None:
+        row = self.rows[self.k]
+        if not row["gps_new"]:
+            return None
+        return GpsFix(
+            float(row["gps_t_s"]),
+            row["gps_p_e_m"],
+            row["gps_v_e_m_s"],
+            float(row["gps_course_rad"]),
+            float(row["gps_speed_m_s"]),
+        )
+
+    @property
+    def mag(self) -> MagSample | None:
+        row = self.rows[self.k]
+        return MagSample(row["mag_b_ut"]) if row["mag_new"] else None
+
+    @property
+    def air(self) -> AirData | None:
+        row = self.rows[self.k]
+        return AirData(float(row["airspeed_m_s"]), float(row["baro_height_m"])) if row["air_new"] else None
+
+
+class Health(IntEnum):
+    """What an estimator says of itself."""
+
+    STARTING = 0  # before power-up ended, or heading not yet found
+    GOOD = 1
+    POOR = 2  # coasting on gyros, samples being rejected
+
+
+def _zeros() -> Array:
+    return np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeEstimate:
+    """What an estimator returns for each tick; only `R_eb` is required.
+
+    R_eb : shape (3, 3)               body-to-earth rotation
+    omega_b_rad_s : shape (3,)        drift-corrected rate (used for damping by the autopilot)
+    gyro_bias_b_rad_s : shape (3,)    what the gyro reads too much
+    wind_e_m_s : shape (3,) or None   velocity of the air over the ground, None where not estimated
+    health : Health
+    """
+
+    R_eb: Array
+    omega_b_rad_s: Array = field(default_factory=_zeros)
+    gyro_bias_b_rad_s: Array = field(default_factory=_zeros)
+    wind_e_m_s: Array | None = None
+    health: Health = Health.GOOD
+
+
+HeadingReference = Literal["course", "nose"]
+
+
+@runtime_checkable
+class AttitudeEstimator(Protocol):
+    """The seam.  Only `update` is required of one's own class.
+
+    Optional: ``heading_reference``, "course" (default) or "nose", what the heading converges to; and
+    ``reset(on_ground)``, called at power-up with the mean inertial sample of the calibration window, or
+    with None where the flight starts in the air.
+    """
+
+    def update(self, m: Measurements) -> AttitudeEstimate:
+        """Take one tick's measurements, return the attitude at its end.  Called once per IMU sample."""
+        ...

@@ -1,0 +1,1 @@
+"""The world: truth, devices, and the one loop that orders them."""
