@@ -1,0 +1,55 @@
+"""Rates of the loop: everything happens on integer ticks of the physics."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+
+def _divides(rate_hz: float, base_hz: int) -> bool:
+    return rate_hz > 0 and (Fraction(base_hz) / Fraction(str(rate_hz))).denominator == 1
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Physics, inertial and GPS rates in hertz; the slower ones divide the physics rate.
+
+    A tick of the loop is one inertial sample (estimator and autopilot run once per tick); a GPS report may fall
+    between two ticks and is delivered in the tick that ends at or after its arrival.
+    """
+
+    physics_hz: int = 200
+    imu_hz: int = 50
+    gps_hz: float = 4.0
+
+    def __post_init__(self) -> None:
+        if self.physics_hz not in (100, 200, 400, 1000):
+            raise ValueError(f"physics rate {self.physics_hz} Hz: choose 100, 200, 400 or 1000 Hz")
+        for what, rate, choices in (
+            ("inertial rate", self.imu_hz, (40, 50, 100, 200)),
+            ("GPS rate", self.gps_hz, (1, 2, 2.5, 4, 5, 10)),
+        ):
+            possible = [c for c in choices if _divides(c, self.physics_hz)]
+            if rate not in possible:
+                names = ", ".join(str(c) for c in possible)
+                raise ValueError(
+                    f"{what} {rate:g} Hz does not divide the physics rate of {self.physics_hz} Hz "
+                    f"into whole steps that are supported: choose {names} Hz"
+                )
+
+    @property
+    def dt_s(self) -> float:
+        """Length of a tick, s."""
+        return 1.0 / self.imu_hz
+
+    @property
+    def steps_per_tick(self) -> int:
+        """Physics steps in a tick."""
+        return self.physics_hz // self.imu_hz
+
+    @property
+    def steps_per_fix(self) -> int:
+        """Physics steps between two GPS reports."""
+        return int(Fraction(self.physics_hz) / Fraction(str(self.gps_hz)))
+
+    def ticks(self, duration_s: float) -> int:
+        """Whole ticks in `duration_s`."""
+        return round(duration_s * self.imu_hz)
