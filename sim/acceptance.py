@@ -1,0 +1,146 @@
+"""The border between the loop and flight code: what is asked of it, and what is accepted as an answer.
+
+Estimators and autopilots may be anyone's.  One that raises, or answers with something that is no rotation or no
+command, ends the flight with a line that names the class, the time and the fault.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.interface import ActuatorCommand, Autopilot, Setpoint
+from estimator.interface import Array, AttitudeEstimate, AttitudeEstimator, Measurements
+from estimator.jit import kernel
+from sim.log import Outcome
+
+ROTATION_TOLERANCE = 1e-2  # largest |R R^T - I| that is still taken for a rotation
+_UNKNOWN_WIND = np.full(3, np.nan)
+_FAULTS = {
+    1: "R_eb must have shape (3, 3), the vectors shape (3,)",
+    2: "R_eb is not finite",
+    3: f"R_eb is no rotation: |R R^T - I| above {ROTATION_TOLERANCE:g}, or a reflection",
+    4: "omega_b_rad_s is not finite",
+    5: "gyro_bias_b_rad_s is not finite",
+}
+
+
+class Unusable(ValueError):
+    """An answer of flight code that is no estimate or no command."""
+
+
+class FlightCodeFailed(RuntimeError):
+    """An estimator or autopilot raised or gave an unusable answer; `outcome` says which of the two."""
+
+    def __init__(self, outcome: Outcome, who: object, t_s: float, fault: str) -> None:
+        super().__init__(f"{type(who).__name__} at {t_s:.2f} s: {fault}")
+        self.outcome = outcome
+
+
+@kernel
+def _record_estimate(flown, k, R_eb, omega, bias, wind, health):  # type: ignore[no-untyped-def]
+    """Write the estimate into row `k`; returns 0, or the number of the fault."""
+    if R_eb.shape != (3, 3) or omega.shape[0] != 3 or bias.shape[0] != 3 or wind.shape[0] != 3:
+        return 1
+    row = flown[k]
+    worst = 0.0
+    for i in range(3):
+        row.omega_b_rad_s[i], row.gyro_bias_b_rad_s[i], row.wind_e_m_s[i] = omega[i], bias[i], wind[i]
+        for j in range(3):
+            row.R_eb[i, j] = R_eb[i, j]
+            dot = R_eb[i, 0] * R_eb[j, 0] + R_eb[i, 1] * R_eb[j, 1] + R_eb[i, 2] * R_eb[j, 2]
+            off = abs(dot - 1.0 if i == j else dot)
+            if not np.isfinite(off):
+                return 2
+            worst = max(worst, off)
+    row.health = health
+    determinant = (
+        R_eb[0, 0] * (R_eb[1, 1] * R_eb[2, 2] - R_eb[1, 2] * R_eb[2, 1])
+        + R_eb[0, 1] * (R_eb[1, 2] * R_eb[2, 0] - R_eb[1, 0] * R_eb[2, 2])
+        + R_eb[0, 2] * (R_eb[1, 0] * R_eb[2, 1] - R_eb[1, 1] * R_eb[2, 0])
+    )
+    if worst > ROTATION_TOLERANCE or determinant < 0.0:
+        return 3
+    if not np.isfinite(omega[0] + omega[1] + omega[2]):
+        return 4
+    if not np.isfinite(bias[0] + bias[1] + bias[2]):
+        return 5
+    return 0
+
+
+@kernel
+def _record_command(flown, k, aileron, elevator, rudder, throttle, mode, bank, pitch):  # type: ignore[no-untyped-def]
+    """Write the command into row `k`; returns whether all four are finite."""
+    row = flown[k]
+    row.aileron, row.elevator, row.rudder, row.throttle = aileron, elevator, rudder, throttle
+    row.mode, row.bank_demand_rad, row.pitch_demand_rad = mode, bank, pitch
+    return np.isfinite(aileron + elevator + rudder + throttle)
+
+
+def _as_floats(value: Any) -> Array:
+    return np.ascontiguousarray(value, dtype=np.float64)
+
+
+def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> None:
+    """Write estimate `e` into row `k` of `flown`; Unusable where it is none."""
+    wind = _UNKNOWN_WIND if e.wind_e_m_s is None else e.wind_e_m_s
+    R_eb, omega, bias = e.R_eb, e.omega_b_rad_s, e.gyro_bias_b_rad_s
+    if not (R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray and R_eb.ndim == 2):
+        R_eb, omega, bias, wind = _as_floats(R_eb), _as_floats(omega), _as_floats(bias), _as_floats(wind)
+        if (R_eb.shape, omega.shape, bias.shape, wind.shape) != ((3, 3), (3,), (3,), (3,)):
+            raise Unusable(_FAULTS[1])
+    fault = _record_estimate(flown, k, R_eb, omega, bias, wind, int(e.health))
+    if fault:
+        raise Unusable(_FAULTS[fault])
+
+
+def record_command(flown: NDArray[Any], k: int, command: ActuatorCommand) -> None:
+    """Write `command` into row `k` of `flown`; Unusable where it is not finite."""
+    if not _record_command(flown, k, *command):
+        raise Unusable(f"the command is not finite: {tuple(float(c) for c in command[:4])}")
+
+
+@contextmanager
+def blaming(outcome: Outcome, who: object, t_s: float) -> Iterator[None]:
+    """Turn whatever `who` raises inside the block into a FlightCodeFailed: it is a result of the flight."""
+    try:
+        yield
+    except Exception as error:
+        raise _failure(outcome, who, t_s, error) from error
+
+
+def _failure(outcome: Outcome, who: object, t_s: float, error: Exception) -> FlightCodeFailed:
+    text = " ".join(str(error).split()) or "no message"
+    fault = text if isinstance(error, Unusable) else f"{type(error).__name__}: {text}"
+    return FlightCodeFailed(outcome, who, t_s, fault)
+
+
+def estimate_of(
+    estimator: AttitudeEstimator, measured: Measurements, flown: NDArray[Any], k: int
+) -> AttitudeEstimate:
+    """Ask the estimator for tick `k` and record what it says; FlightCodeFailed where that is unusable."""
+    try:
+        estimate = estimator.update(measured)
+        record_estimate(flown, k, estimate)
+    except Exception as error:
+        raise _failure(Outcome.ESTIMATOR_FAILED, estimator, measured.imu.t_s, error) from error
+    return estimate
+
+
+def command_of(
+    autopilot: Autopilot,
+    estimate: AttitudeEstimate,
+    measured: Measurements,
+    setpoint: Setpoint,
+    flown: NDArray[Any],
+    k: int,
+) -> ActuatorCommand:
+    """Ask the autopilot for tick `k` and record what it commands; FlightCodeFailed where that is unusable."""
+    try:
+        command = autopilot.update(estimate, measured, setpoint)
+        record_command(flown, k, command)
+    except Exception as error:
+        raise _failure(Outcome.AUTOPILOT_FAILED, autopilot, measured.imu.t_s, error) from error
+    return command

@@ -1,0 +1,43 @@
+"""What happened in a flight, read from its log afterwards: phases, modes, the GPS, the end."""
+
+import numpy as np
+
+from autopilot.interface import Mode
+from estimator.interface import Health
+from sim.log import Event, Log, Outcome, Phase
+
+_GPS_SILENCE_S = 2.5  # without a fix for longer, the GPS counts as lost
+_PHASES = {Phase.HELD: "held in the hand", Phase.THROWN: "thrown", Phase.FLYING: "released"}
+
+
+def events_of(log: Log, outcome: Outcome, message: str) -> tuple[Event, ...]:
+    """Events of `log` in order of time; the last one says how the flight ended where that was not as planned."""
+    if len(log) == 0:
+        return (Event(0.0, message or outcome, "error"),) if outcome != Outcome.COMPLETED else ()
+    t_s = log.truth["t_s"]
+    events = []
+
+    def changes(column: np.ndarray) -> list[int]:
+        return [0, *(np.flatnonzero(np.diff(column)) + 1).tolist()]
+
+    if log.truth["phase"][0] != Phase.FLYING:
+        events += [Event(float(t_s[k]), _PHASES[Phase(log.truth["phase"][k])]) for k in changes(log.truth["phase"])]
+    events += [
+        Event(float(t_s[k]), f"mode {Mode(log.flown['mode'][k]).name.lower()}") for k in changes(log.flown["mode"])
+    ]
+    events += [
+        Event(float(t_s[k]), f"estimator {Health(log.flown['health'][k]).name.lower()}")
+        for k in changes(log.flown["health"])
+    ]
+    fixes = np.flatnonzero(log.measured["gps_new"])
+    if len(fixes):
+        events.append(Event(float(t_s[fixes[0]]), "first GPS fix"))
+        gaps = np.diff(t_s[fixes], append=t_s[-1])
+        for i in np.flatnonzero(gaps > _GPS_SILENCE_S):
+            events.append(Event(float(t_s[fixes[i]] + _GPS_SILENCE_S), "GPS lost", "warn"))
+            if i + 1 < len(fixes):
+                events.append(Event(float(t_s[fixes[i + 1]]), "GPS back"))
+    if outcome != Outcome.COMPLETED:
+        level = "warn" if outcome == Outcome.INTERRUPTED else "error"
+        events.append(Event(float(t_s[-1]), message or outcome.replace("_", " "), level))
+    return tuple(sorted(events, key=lambda e: e.t_s))

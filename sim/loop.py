@@ -1,0 +1,99 @@
+"""The loop: the one place that orders the calls.
+
+    plant -> truth -> sensors -> measurements -> estimator -> estimate -> autopilot -> command -> plant
+
+Nothing is written while flying except into the rows of the log.  Whatever ends a flight, the rows up to there
+are returned.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from autopilot.interface import NEUTRAL, Autopilot
+from autopilot.pilot import Script
+from estimator.interface import AttitudeEstimator, ImuSample
+from sim.acceptance import FlightCodeFailed, blaming, command_of, estimate_of, record_command
+from sim.events import events_of
+from sim.log import Flight, Log, Outcome
+from sim.oracle import Oracle
+from sim.plant import Plant, SimulationDiverged
+from sim.sensors.suite import Suite
+
+Watch = Callable[[Log, int], None]  # shown the log and the number of its rows that are filled
+
+
+def fly(
+    plant: Plant,
+    suite: Suite,
+    estimator: AttitudeEstimator,
+    autopilot: Autopilot,
+    script: Script,
+    log: Log,
+    *,
+    calibration_s: float = 0.0,
+    manifest: dict[str, Any] | None = None,
+    watch: Watch | None = None,
+) -> Flight:
+    """Fly until the rows of `log` are full or the flight ends.
+
+    Parameters
+    ----------
+    script          set-points by time since the release
+    calibration_s   time after power-up over which the inertial samples are averaged for ``estimator.reset``;
+                    0 where the flight starts in the air, which is ``reset(None)``
+    manifest        seed, resolved configuration, versions: goes into the recording
+    watch           called once a simulated second with the log and the number of rows filled so far
+    """
+    outcome, message, k = Outcome.COMPLETED, "", 0
+    second = round(1.0 / plant.dt_s)
+    to_release_s = plant.dt_s - plant.release_s
+    command = NEUTRAL
+    try:
+        plant.reset(log)
+        suite.reset(log)
+        if isinstance(estimator, Oracle):
+            estimator.watch(log)
+        if hasattr(autopilot, "reset"):
+            autopilot.reset()
+        n_calibration = round(calibration_s / plant.dt_s)
+        for k in range(len(log)):
+            ended = plant.advance(k, command)
+            if ended is not None:
+                outcome = ended
+                break
+            measured = suite.measure(k)
+            if k < n_calibration:
+                record_command(log.flown, k, command)
+                continue
+            if k == n_calibration:
+                _power_up(estimator, log, n_calibration)
+            setpoint = script.at(k * plant.dt_s + to_release_s)
+            estimate = estimate_of(estimator, measured, log.flown, k)
+            command = command_of(autopilot, estimate, measured, setpoint, log.flown, k)
+            if watch is not None and k % second == second - 1:
+                watch(log, k + 1)
+        else:
+            k = len(log)
+    except FlightCodeFailed as failure:
+        outcome, message = failure.outcome, str(failure)
+    except SimulationDiverged as blow_up:
+        outcome, message = Outcome.DIVERGED, str(blow_up)
+    except KeyboardInterrupt:
+        outcome, message = Outcome.INTERRUPTED, f"interrupted {k * plant.dt_s:.1f} s after power-up"
+    flown = log.until(k)
+    events = events_of(flown, outcome, message)
+    reference = getattr(estimator, "heading_reference", "course")
+    return Flight(flown, plant.dt_s, plant.release_s, outcome, reference, message, events, manifest or {})
+
+
+def _power_up(estimator: AttitudeEstimator, log: Log, n_ticks: int) -> None:
+    """Switch the estimator on with the mean inertial sample of the first `n_ticks`, or None where there are none."""
+    if not hasattr(estimator, "reset"):
+        return
+    on_ground = None
+    if n_ticks:
+        rows = log.measured[:n_ticks]
+        gyro, force = rows["gyro_b_rad_s"].mean(axis=0), rows["force_b_m_s2"].mean(axis=0)
+        on_ground = ImuSample(float(rows["t_s"][-1]), float(rows["dt_s"].sum()), gyro, force)
+    with blaming(Outcome.ESTIMATOR_FAILED, estimator, on_ground.t_s if on_ground else 0.0):
+        estimator.reset(on_ground)

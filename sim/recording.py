@@ -1,0 +1,282 @@
+"""A flight on disk: every tick of every column in Parquet, and beside it what is needed to fly it again.
+
+``flight.parquet``   one row per tick.  A column is named table, quantity and element: ``truth.R_eb.zx``,
+                     ``measured.gyro_b_rad_s.x``, ``flown.wind_e_m_s.n``; its Arrow field says what it means.
+                     Its schema carries the same record as the manifest, so that the file stands alone.
+``manifest.json``    seed, resolved configuration, versions, outcome and events, for people and scripts; the
+                     SHA-256 of the Parquet file vouches for the pair.
+
+A file appears under its name complete or not at all: it is written beside it and renamed.
+"""
+
+import hashlib
+import json
+import math
+import os
+import platform
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, is_dataclass
+from enum import Enum
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from estimator.interface import Column
+from sim.log import TABLES, Event, Flight, Log, Outcome
+
+PARQUET = "flight.parquet"
+MANIFEST = "manifest.json"
+FORMAT = 1  # raised when the columns or the record change in a way that an older reader would misread
+_KEY = b"wingslevel"
+_OWN = ("format", "outcome", "message", "heading_reference", "dt_s", "release_s", "n_ticks", "events", "sha256")
+
+
+class RecordingError(ValueError):
+    """A recording cannot be written or read; the message names the path and the reason."""
+
+
+class Element(NamedTuple):
+    """One Parquet column: `index` of `column` in `table`, under the name it has in the file."""
+
+    name: str
+    table: str
+    column: Column
+    index: tuple[int, ...]
+
+
+def elements() -> tuple[Element, ...]:
+    """Every Parquet column in file order, made from the column tables of the log.
+
+    A matrix is named by the paper's row and column letters, a vector in the earth frame by n, e, d, one in the
+    body frame by x, y, z.
+    """
+    found = []
+    for table, columns in TABLES.items():
+        for column in columns:
+            axes = "ned" if "_e_" in column.name and len(column.shape) == 1 else "xyz"
+            for index in np.ndindex(column.shape):
+                suffix = "." + "".join(axes[i] for i in index) if index else ""
+                found.append(Element(f"{table}.{column.name}{suffix}", table, column, index))
+    return tuple(found)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that decide what a flight looks like; goes into the manifest."""
+    found = {"python": platform.python_version()}
+    for package in ("jsbsim", "numpy", "numba", "wingslevel"):
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def digest(flight: Flight) -> str:
+    """SHA-256 over the name and the bytes of every column, hexadecimal: equal for bit-equal logs alone."""
+    sha = hashlib.sha256()
+    for name, values in _columns(flight.log):
+        sha.update(f"{name}:{values.dtype.str}:{len(values)};".encode())
+        sha.update(values.tobytes())
+    return sha.hexdigest()
+
+
+def check_writable(directory: str | Path) -> None:
+    """Refuse, before flying, a directory in which a recording could not be written; leaves no trace.
+
+    Raises
+    ------
+    RecordingError    naming the directory and the reason
+    """
+    directory, made = Path(directory), []
+    missing = [p for p in (directory, *directory.parents) if not p.exists()]
+    try:
+        for path in reversed(missing):
+            path.mkdir()
+            made.append(path)
+        with tempfile.TemporaryFile(dir=directory) as file:
+            file.write(b"x")
+    except OSError as error:
+        raise _unwritable(directory, error) from error
+    finally:
+        for path in reversed(made):
+            path.rmdir()
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside `path` to write to; rename it to `path` at the end, remove it on any exception.
+
+    Raises
+    ------
+    RecordingError    where the system refuses to write
+    """
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+    finally:
+        # Also on Ctrl-C; where the rename was done there is nothing left to remove.
+        if os.path.lexists(temporary):
+            temporary.unlink()
+
+
+def save(flight: Flight, directory: str | Path) -> Path:
+    """Write `flight` into `directory`, made where it is missing, and return that directory.
+
+    Raises
+    ------
+    RecordingError    where the system refuses to write, or the manifest uses a name that the recording owns
+    """
+    directory = Path(directory)
+    record = _record(flight)
+    manifest = directory / MANIFEST
+    with replacing(directory / PARQUET) as path:
+        pq.write_table(
+            _table(flight.log, record),
+            path,
+            compression="zstd",
+            use_dictionary=[e.name for e in elements() if e.column.integer],
+            use_byte_stream_split=[e.name for e in elements() if not e.column.integer],  # halves noisy floats
+        )
+        record["sha256"] = _sha256(path)
+        manifest.unlink(missing_ok=True)  # never an old manifest beside a new flight, whenever we are interrupted
+    with replacing(manifest) as path:
+        path.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return directory
+
+
+def load(source: str | Path) -> Flight:
+    """The flight that `save` wrote, bit for bit, from its directory or its Parquet file.
+
+    Raises
+    ------
+    RecordingError    no recording there, a truncated or foreign file, other columns than this version's, or a
+                      file that its manifest does not vouch for
+    """
+    path = Path(source)
+    if path.is_dir():
+        path = path / PARQUET
+    try:
+        table = pq.read_table(path)
+    except FileNotFoundError as error:
+        raise RecordingError(f"no recording at {path}: there is no such file") from error
+    except (OSError, pa.ArrowException) as error:
+        raise RecordingError(f"cannot read {path}: truncated, or not a Parquet file ({_first_line(error)})") from error
+    record = _record_of(table.schema, path)
+    _check_sha256(path)
+    return Flight(
+        log=_log_of(table, path),
+        dt_s=record["dt_s"],
+        release_s=record["release_s"],
+        outcome=Outcome(record["outcome"]),
+        heading_reference=record["heading_reference"],
+        message=record["message"],
+        events=tuple(Event(**event) for event in record["events"]),
+        manifest={name: value for name, value in record.items() if name not in _OWN},
+    )
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON knows it: dataclasses and mappings as dicts, NumPy as numbers, NaN and infinity as None."""
+    if isinstance(value, Enum):  # before numbers and strings, which an enumeration may also be
+        return value.value if isinstance(value, str) else value.name.lower()
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, Mapping):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(item) for item in value]
+    return str(value)
+
+
+def _columns(log: Log) -> Iterator[tuple[str, NDArray[Any]]]:
+    for e in elements():
+        yield e.name, np.ascontiguousarray(getattr(log, e.table)[e.column.name][(slice(None), *e.index)])
+
+
+def _table(log: Log, record: dict[str, Any]) -> pa.Table:
+    fields, arrays = [], []
+    for e, (name, values) in zip(elements(), _columns(log), strict=True):
+        about = {"meaning": e.column.meaning, "shape": json.dumps(e.column.shape), "index": json.dumps(e.index)}
+        arrays.append(pa.array(values))
+        fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=about))
+    return pa.table(arrays, schema=pa.schema(fields, metadata={_KEY: json.dumps(record, allow_nan=False)}))
+
+
+def _record(flight: Flight) -> dict[str, Any]:
+    taken = sorted(set(_OWN) & set(flight.manifest))
+    if taken:
+        raise RecordingError(f"the manifest may not hold {', '.join(taken)}: the recording writes that itself")
+    own = {
+        "format": FORMAT,
+        "outcome": flight.outcome,
+        "message": flight.message,
+        "heading_reference": flight.heading_reference,
+        "dt_s": flight.dt_s,
+        "release_s": flight.release_s,
+        "n_ticks": len(flight.log),
+        "events": flight.events,
+    }
+    return plain({"versions": versions(), **flight.manifest, **own})
+
+
+def _record_of(schema: pa.Schema, path: Path) -> dict[str, Any]:
+    stored = (schema.metadata or {}).get(_KEY)
+    if stored is None:
+        raise RecordingError(f"{path} is a Parquet file, but not a flight: it carries no record of wingslevel")
+    record = json.loads(stored)
+    if record["format"] != FORMAT:
+        raise RecordingError(f"{path} has recording format {record['format']}; this version reads {FORMAT}")
+    return record
+
+
+def _log_of(table: pa.Table, path: Path) -> Log:
+    expected, found = [e.name for e in elements()], table.column_names
+    if odd := sorted(set(expected) ^ set(found)):
+        kind = "lacks" if odd[0] in expected else "has the unknown"
+        raise RecordingError(f"{path} was recorded by another version: it {kind} column {odd[0]}")
+    log = Log.empty(table.num_rows)
+    for e in elements():
+        getattr(log, e.table)[e.column.name][(slice(None), *e.index)] = table[e.name].to_numpy()
+    return log
+
+
+def _check_sha256(path: Path) -> None:
+    manifest = path.with_name(MANIFEST)
+    if path.name != PARQUET or not manifest.exists():
+        return
+    try:
+        promised = json.loads(manifest.read_text(encoding="utf-8"))["sha256"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RecordingError(f"cannot read {manifest}: not a manifest of a flight ({_first_line(error)})") from error
+    if promised != _sha256(path):
+        raise RecordingError(f"{path} is not the file that {MANIFEST} beside it describes: its SHA-256 differs")
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _unwritable(path: Path, error: OSError) -> RecordingError:
+    return RecordingError(f"cannot write to {path}: {error.strerror or _first_line(error)}")
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

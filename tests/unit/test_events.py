@@ -1,0 +1,40 @@
+"""Events read from a log."""
+
+import numpy as np
+
+from autopilot.interface import Mode
+from sim.events import events_of
+from sim.log import Log, Outcome, Phase
+
+
+def log_of(seconds):
+    log = Log.empty(seconds * 50)
+    log.truth["t_s"] = log.measured["t_s"] = 0.02 * np.arange(1, len(log) + 1)
+    log.truth["phase"] = Phase.FLYING
+    log.flown["health"] = 1
+    return log
+
+
+def test_events_of_a_throw_name_its_phases_in_order():
+    log = log_of(4)
+    log.truth["phase"][:100], log.truth["phase"][100:115] = Phase.HELD, Phase.THROWN
+    log.flown["mode"] = Mode.LAUNCH
+    texts = [e.text for e in events_of(log, Outcome.COMPLETED, "") if "mode" not in e.text and "estim" not in e.text]
+    assert texts == ["held in the hand", "thrown", "released"]
+
+
+def test_events_of_a_gps_gap_say_lost_and_back():
+    log = log_of(20)
+    log.measured["gps_new"][np.r_[0:250:12, 750:1000:12]] = 1
+    found = {e.text: e.t_s for e in events_of(log, Outcome.COMPLETED, "")}
+    assert abs(found["GPS lost"] - (log.truth["t_s"][240] + 2.5)) < 1e-9
+    assert found["GPS back"] == log.truth["t_s"][750]
+
+
+def test_events_of_a_failed_flight_end_with_the_fault():
+    last = events_of(log_of(2), Outcome.ESTIMATOR_FAILED, "Mine at 2.00 s: R_eb is not finite")[-1]
+    assert (last.level, last.text) == ("error", "Mine at 2.00 s: R_eb is not finite")
+
+
+def test_events_of_an_empty_log_still_tell_the_end():
+    assert events_of(Log.empty(0), Outcome.DIVERGED, "blew up")[0].text == "blew up"
