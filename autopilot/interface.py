@@ -19,6 +19,20 @@ class Mode(IntEnum):
     LAUNCH = 5  # motor off until the throw is felt, then a straight climb to the height
 
 
+_UPRIGHT_RAD = math.radians(85.0)  # the attitude modes hold no steeper bank or pitch: beyond, fly RATE
+_RANGES = (
+    ("aileron", -1.0, 1.0, "of full deflection"),
+    ("elevator", -1.0, 1.0, "of full deflection"),
+    ("rudder", -1.0, 1.0, "of full deflection"),
+    ("bank_rad", -_UPRIGHT_RAD, _UPRIGHT_RAD, "rad"),
+    ("pitch_rad", -_UPRIGHT_RAD, _UPRIGHT_RAD, "rad"),
+    ("course_rad", -4.0 * math.pi, 4.0 * math.pi, "rad"),
+    ("height_m", -1e5, 1e5, "m"),
+    ("bank_limit_rad", 0.0, _UPRIGHT_RAD, "rad"),
+    ("throttle", 0.0, 1.0, "of full throttle"),
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Setpoint:
     """What the aeroplane shall do from now on.  Which fields count depends on the mode.
@@ -44,12 +58,21 @@ class Setpoint:
     bank_limit_rad: float = math.radians(35.0)
     throttle: float = math.nan
 
+    def __post_init__(self) -> None:
+        """Refuse what no aeroplane can be asked, here and not in the air."""
+        for name, low, high, unit in _RANGES:
+            value = getattr(self, name)
+            if not low <= value <= high and not (name == "throttle" and math.isnan(value)):
+                raise ValueError(f"Setpoint.{name}: {value!r} {unit} is not within {low:g} .. {high:g}")
+        if len(self.rate_b_rad_s) != 3 or not all(map(math.isfinite, self.rate_b_rad_s)):
+            raise ValueError(f"Setpoint.rate_b_rad_s: {self.rate_b_rad_s!r} rad/s must be finite (p, q, r)")
+
 
 class ActuatorCommand(NamedTuple):
     """What the servos and the motor are told; with it, for the record, what the inner loop was asked to hold.
 
-    aileron, elevator, rudder : -1..1, in the sense of the rotation they cause: roll right, nose up, nose right
-    throttle : 0..1     mode : the mode in force     bank_demand_rad, pitch_demand_rad : NaN where none is held
+    aileron, elevator, rudder : -1..1, sense of the rotation they cause: roll right, nose up, nose right
+    throttle : 0..1    mode : the mode in force    bank_demand_rad, pitch_demand_rad : NaN where none is held
     """
 
     aileron: float

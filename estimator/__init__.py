@@ -36,3 +36,32 @@ Time
 ``t_s`` of a sample is the end of its interval.  A log row k holds the interval that ends at
 ``t_s = (k + 1) * dt_s`` after power-up.
 """
+
+from collections.abc import Callable
+from typing import TypeVar
+
+ESTIMATORS: dict[str, str] = {
+    "premerlani": "estimator.premerlani:Premerlani",
+    "gyro_only": "estimator.baselines:GyroOnly",
+    "accelerometer_only": "estimator.baselines:AccelerometerOnly",
+}
+"""Every estimator that can be named: name -> ``module:Class``, imported only when it flies."""
+
+_Class = TypeVar("_Class", bound=type)
+
+
+def register(name: str) -> Callable[[_Class], _Class]:
+    """Class decorator: make one's own estimator known under `name`.
+
+    Raises
+    ------
+    ValueError    the name is taken by another class
+    """
+
+    def enter(cls: _Class) -> _Class:
+        where = f"{cls.__module__}:{cls.__qualname__}"
+        if ESTIMATORS.setdefault(name, where) != where:
+            raise ValueError(f"estimator {name!r} is already {ESTIMATORS[name]}; choose another name than {name!r}")
+        return cls
+
+    return enter

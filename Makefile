@@ -1,0 +1,38 @@
+# Works with nothing but Python >= 3.11, pip and make:  make fly   make test
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+WORKERS ?= 2
+
+.DEFAULT_GOAL := help
+.PHONY: help venv fly test lint clean
+
+help:  ## what can be made
+	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
+
+venv: $(STAMP)  ## set up .venv: the project, editable, with its development tools
+
+# Dependency groups need pip >= 25.1, which a system Python seldom brings.
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "wingslevel needs Python >= 3.11; name one with: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(BIN)/python -m pip install --quiet --editable . --group dev
+	@touch $@
+
+fly: venv  ## set up, and fly the hand launch
+	@$(BIN)/wingslevel fly hand_launch
+
+lint: venv  ## style, types, layers
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint  ## set up, lint, and run all tests
+	$(BIN)/pytest -n $(WORKERS)
+
+clean:  ## remove what was made here, the virtual environment included
+	rm -rf $(VENV) flights dist build .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -1,0 +1,67 @@
+"""The hand launch: the motor waits for the throw, then climbs straight ahead to the height.
+
+The throw is felt as acceleration along the nose.  Gravity is taken off with the matrix, so that a nose held
+high in the hand is not a throw; sway and knocks are short against the mean that is judged.
+"""
+
+import math
+from dataclasses import dataclass
+
+from autopilot.guidance import height, hold_height
+from autopilot.stabilise import G_M_S2
+from estimator.jit import kernel
+
+
+@dataclass(frozen=True, slots=True)
+class LaunchParams:
+    """When it is a throw, and how to climb away.
+
+    throw_m_s2, throw_mean_s : mean acceleration along the nose that is a throw, time constant of that mean
+    motor_delay_s : from the throw felt to full throttle, for the fingers
+    level_off_m : below the height, where the climb at constant pitch ends and the height loop takes over
+    climb_pitch_rad : demanded in the climb     first_pitch_rad, first_s : and at first, while speed is gained
+    """
+
+    throw_m_s2: float = 0.8 * G_M_S2
+    throw_mean_s: float = 0.1
+    motor_delay_s: float = 0.2
+    level_off_m: float = 5.0
+    climb_pitch_rad: float = math.radians(14.0)
+    first_pitch_rad: float = math.radians(10.0)
+    first_s: float = 1.5
+
+
+@kernel
+def feel_throw(R_eb, row, s, p, dt_s):  # type: ignore[no-untyped-def]
+    """Seconds since the throw was felt, negative where it has not been; call once per tick.
+
+    R_eb : shape (3, 3)   row : measured   s : record with `felt_m_s2`, `thrown_s`, updated
+    """
+    if s.thrown_s >= 0.0:
+        s.thrown_s += dt_s
+    elif math.isfinite(row.force_b_m_s2[0]):
+        # Specific force is acceleration minus gravity; gravity along the nose is g r_zx.
+        along_nose = row.force_b_m_s2[0] + G_M_S2 * R_eb[2, 0]
+        s.felt_m_s2 += (along_nose - s.felt_m_s2) * dt_s / (p.throw_mean_s + dt_s)
+        if s.felt_m_s2 > p.throw_m_s2:
+            s.thrown_s = 0.0
+    return s.thrown_s
+
+
+@kernel
+def climb_away(thrown_s, height_m, row, s, p, guidance, dt_s):  # type: ignore[no-untyped-def]
+    """Pitch demand, rad, and throttle, 0..1, of a launch; wings level is the caller's.
+
+    Waiting, motor off; thrown, full throttle and the climb; near the height, the height loop for good.
+
+    thrown_s : since the throw, or negative   height_m : demanded   s : record with `levelled_off`, updated
+    p, guidance : records of LaunchParams, GuidanceParams
+    """
+    if thrown_s < 0.0:
+        return p.first_pitch_rad, 0.0
+    if height(row, guidance) > height_m - p.level_off_m:  # False where there is no height
+        s.levelled_off = 1
+    if s.levelled_off:
+        return hold_height(height_m, row, s, guidance, dt_s)
+    throttle = 1.0 if thrown_s >= p.motor_delay_s else 0.0
+    return (p.first_pitch_rad if thrown_s < p.first_s else p.climb_pitch_rad), throttle

@@ -1,0 +1,83 @@
+"""The Python side of a compiled estimator: its state is one record, its step one kernel.
+
+An estimator module owns its kernel ``step(rows, k, state) -> Health``, runs it over a log in a kernel ``replay``,
+and lets `Compiled` speak the `AttitudeEstimator` protocol.  Its state starts with the columns of `BELIEF`.
+"""
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import AttitudeEstimate, Column, Health, Measurements, dtype_of
+from estimator.jit import kernel
+
+BELIEF = (
+    Column("R_eb", (3, 3), "estimated body-to-earth rotation"),
+    Column("omega_b_rad_s", (3,), "drift-corrected rate"),
+    Column("gyro_bias_b_rad_s", (3,), "what the gyro is believed to read too much"),
+)
+ESTIMATE = (*BELIEF, Column("health", (), "0 starting, 1 good, 2 poor", integer=True))
+ESTIMATE_DTYPE = dtype_of(ESTIMATE)
+
+_HEALTH = tuple(Health)  # an index into a tuple costs a tenth of a call of the enumeration
+
+
+@kernel
+def write_estimate(s, health, estimate):  # type: ignore[no-untyped-def]
+    """Copy the belief of the state record `s` into a record of ESTIMATE."""
+    estimate.health = health
+    for i in range(3):
+        estimate.omega_b_rad_s[i] = s.omega_b_rad_s[i]
+        estimate.gyro_bias_b_rad_s[i] = s.gyro_bias_b_rad_s[i]
+        for j in range(3):
+            estimate.R_eb[i, j] = s.R_eb[i, j]
+
+
+class Compiled:
+    """An estimator around the kernels `_step` and `_replay` and a state record; a subclass brings these and `reset`."""
+
+    _step: ClassVar[Callable[..., int]]
+    _replay: ClassVar[Callable[..., None]]
+
+    def __init__(self, state_dtype: np.dtype[Any]) -> None:
+        self._state = np.zeros(1, state_dtype)
+        self._R_eb = self._state["R_eb"][0]
+        self._omega_b_rad_s = self._state["omega_b_rad_s"][0]
+        self._gyro_bias_b_rad_s = self._state["gyro_bias_b_rad_s"][0]
+
+    def update(self, m: Measurements) -> AttitudeEstimate:
+        """Take one tick's measurements, return the attitude at its end; the arrays are the caller's to keep."""
+        health = self._step(m.rows, m.k, self._state)
+        return AttitudeEstimate(
+            self._R_eb.copy(), self._omega_b_rad_s.copy(), self._gyro_bias_b_rad_s.copy(), None, _HEALTH[health]
+        )
+
+    def replay(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Run over a whole log in one call, from the present state on: bit for bit what `update` gives row by row.
+
+        Parameters
+        ----------
+        rows : shape (N,), MEASURED_DTYPE
+
+        Returns
+        -------
+        shape (N,), ESTIMATE_DTYPE: R_eb, omega_b_rad_s, gyro_bias_b_rad_s, health
+        """
+        estimates = np.zeros(len(rows), ESTIMATE_DTYPE)
+        self._replay(rows, self._state, estimates)
+        return estimates
+
+    def snapshot(self) -> NDArray[Any]:
+        """Everything that changes, and the parameters, as one record of shape (1,)."""
+        return self._state.copy()
+
+    def restore(self, snapshot: NDArray[Any]) -> None:
+        """Go on from a `snapshot`."""
+        self._state[:] = snapshot
+
+    @property
+    def rejected(self) -> int:
+        """Ticks in which something was not believed, since the reset."""
+        return int(self._state["rejected"][0])

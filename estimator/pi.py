@@ -1,0 +1,48 @@
+"""The weighted proportional-plus-integral drift controller, Eqns 28 and 29 of the paper.
+
+Linearised about a small attitude error e (axis by axis, the other reference silent) with an uncorrected gyro
+offset b, the loop is
+
+    de/dt = b - K_P W e + w_I,    dw_I/dt = -K_I W e    so    s^2 + K_P W s + K_I W = 0
+
+The integral ends at -b with no error left; its slow eigenvalue is close to K_I / K_P.
+
+References
+----------
+W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009, section "Feedback controller".
+"""
+
+import numpy as np
+
+from estimator.jit import kernel
+from estimator.kernels import clip
+
+
+@kernel
+def weigh(w_rp, roll_pitch_b, w_y, yaw_b, total_b):  # type: ignore[no-untyped-def]
+    """Fill `total_b` with the weighted sum of the two corrections, all of shape (3,), body axes (Eqn 28)."""
+    for i in range(3):
+        total_b[i] = w_rp * roll_pitch_b[i] + w_y * yaw_b[i]
+
+
+@kernel
+def feed_back(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_p_b, omega_i_b):  # type: ignore[no-untyped-def]
+    """Update the proportional and the integral rate corrections, in place (Eqn 29).
+
+    In the steady state the proportional correction holds at most the offset that is still to be learnt.  A
+    correction larger than any believable offset is therefore something else (yaw lock, a turn in wind, a throw):
+    the integral sees no more of it than such an offset would cause.  This is all the anti-wind-up there is.
+
+    Parameters
+    ----------
+    total_b : shape (3,)             weighted correction, Eqn 28
+    k_p, k_i : float                 gains, 1/s and 1/s^2 per unit of correction
+    offset_limit_rad_s : float       largest gyro offset that is believed, per axis
+    omega_p_b, omega_i_b : shape (3,)  rate corrections, written
+    """
+    size = k_p * np.sqrt(total_b[0] ** 2 + total_b[1] ** 2 + total_b[2] ** 2)
+    seen = 1.0 if size <= offset_limit_rad_s else offset_limit_rad_s / size
+    for i in range(3):
+        omega_p_b[i] = k_p * total_b[i]
+        integral = omega_i_b[i] + k_i * dt_s * seen * total_b[i]
+        omega_i_b[i] = clip(integral, -offset_limit_rad_s, offset_limit_rad_s)

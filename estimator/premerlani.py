@@ -1,0 +1,348 @@
+"""The direction-cosine-matrix estimator of Premerlani and Bizard: gyros steer, accelerometer and GPS correct.
+
+One pass per inertial sample, in the paper's order: integrate the gyros (Eqns 16-17), renormalise (18-21), compare
+the nose with the course over ground (22-24) and the down axis with the accelerometer freed of centrifugal
+acceleration (25-27), and feed both errors back through one PI controller (28-29).
+
+Errata
+------
+*Eqn 27.*  The paper prints the roll-pitch correction as ``r_z x g_reference``.  With the update of Eqn 17 that
+drives the estimate away: 9 degrees of tilt become 180.  The right form is ``g_reference x r_z``.  Which factor
+comes first depends on where the vector is fixed.  The nose is fixed in the body and is compared in the earth
+frame: there estimate x reference is the rotation still wanted (Eqn 23 is right).  Down is fixed in the earth and
+is compared in the body frame, which turns the other way round: there it is reference x estimate.
+
+*Eqn 25.*  ``omega`` is the gyro with the integral correction, without the proportional one: that is a
+correction of attitude, no rotation of the aeroplane, and would be taken for centrifugal acceleration.
+
+*Eqn 20* prints the Z row's elements as ``r_xx r_xy r_xz``; read ``r_zx r_zy r_zz``.
+
+Beyond the paper
+----------------
+Each has a parameter that turns it off.
+
+*GPS-lag filter* (the paper names it, without equations).  The nose passes the receiver's own filter and latency
+before it meets the course.  Two things follow.  A vector filter also shrinks the speed of a turning aeroplane: it
+is divided by the length of the equally filtered nose.  And a filter inside the feedback loop delays the
+correction: so the filter runs on the motion the gyros felt alone, free of proportional yaw corrections, and all
+of these are applied to its output at once (`rotate_history`; the loop then has no lag, whatever the receiver's).
+
+*Yaw lock.*  The cross product of Eqn 23 fades beyond 90 degrees of error and vanishes at 180.  Beyond 90 its
+sign is kept and its size is one.
+
+*Launch gate.*  While the length of ``g_reference`` is not that of gravity, forward acceleration or a wrong speed
+is in it: no roll-pitch correction then.
+
+*Speed of the turn* (off by default).  In wind the ground speed of Eqn 25 is not the speed through the air that
+turns the aeroplane.  But a turn about the vertical accelerates horizontally: the speed for which ``g_reference`` is
+at right angles to ``omega x V`` needs no GPS at all.  (MatrixPilot took to such a speed in 2017.)
+
+References
+----------
+W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from estimator.compiled import BELIEF, Compiled, write_estimate
+from estimator.interface import Column, HeadingReference, ImuSample, dtype_of
+from estimator.jit import kernel
+from estimator.kernels import clip
+from estimator.pi import feed_back, weigh
+from estimator.rotation import integrate
+from estimator.screening import (
+    FORCE_GOOD,
+    FORCE_RANGE_M_S2,
+    G_M_S2,
+    GYRO_RANGE_RAD_S,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    screen,
+    take_rate,
+)
+
+HISTORY, SPACING_S = 640, 0.0199  # remembered noses and their least distance in time: 12.7 s at any sample rate
+LONGEST_LATENCY_S = 12.5
+FIX_LIFE_S = 2.0  # an older fix corrects nothing any more
+LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this close for this long
+TURN_RAD_S, TURN_S = 0.3, 3.0  # slowest turn that tells a speed, and how slowly it is believed
+SHORTEST_NOSE = 0.3  # a shorter filtered nose (a loop, a spin) restores no speed
+
+
+@dataclass(frozen=True, slots=True)
+class PremerlaniParams:
+    """Gains and options.
+
+    w_rp, w_y : float          weights of the roll-pitch and the yaw correction, Eqn 28.  Large: errors go quickly,
+                               but accelerations and wind get in
+    k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
+    offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
+    gps_lag_filter : bool      compare the course with an equally late nose, restore the speed
+    gps_filter_s : float       time constant of the receiver's velocity filter
+    gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
+    rotate_history : bool      take the receiver's lag out of the yaw loop
+    launch_gate : float        no roll-pitch correction while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
+    turn_speed : bool          learn the speed of Eqn 25 in level turns; needed in wind
+    min_speed_m_s : float      slowest ground speed at which a course means anything
+    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
+    """
+
+    w_rp: float = 0.3
+    w_y: float = 1.2
+    k_p: float = 1.0
+    k_i: float = 0.03
+    offset_limit_rad_s: float = math.radians(6.0)
+    gps_lag_filter: bool = True
+    gps_filter_s: float = 1.0
+    gps_latency_s: float = 0.3
+    rotate_history: bool = True
+    launch_gate: float = 0.3
+    turn_speed: bool = False
+    min_speed_m_s: float = 3.0
+    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
+    force_range_m_s2: float = FORCE_RANGE_M_S2
+
+    def __post_init__(self) -> None:
+        for name in ("w_rp", "w_y", "k_p", "k_i", "gps_filter_s", "gps_latency_s", "min_speed_m_s"):
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise ValueError(f"{name} is {value}; it must be a finite number, zero or more")
+        for name in ("offset_limit_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2"):
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise ValueError(f"{name} is {value}; it must be more than zero (inf turns it off)")
+        if self.gps_latency_s > LONGEST_LATENCY_S:
+            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; at most {LONGEST_LATENCY_S} s are remembered")
+
+
+_PARAMS = tuple(
+    Column(f.name, (), "see PremerlaniParams", integer=isinstance(f.default, bool))
+    for f in fields(PremerlaniParams)
+    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
+)
+_STATE = (
+    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
+    Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
+    Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
+    Column("omega_total_b", (3,), "corrected rate that is integrated, Eqn 16"),
+    Column("roll_pitch_b", (3,), "roll-pitch correction, Eqn 27"),
+    Column("yaw_b", (3,), "yaw correction, Eqn 24"),
+    Column("total_b", (3,), "weighted sum, Eqn 28"),
+    Column("g_ref_b_m_s2", (3,), "reference of gravity, Eqn 26"),
+    Column("speed_m_s", (), "speed of Eqn 25"),
+    Column("turn_speed_m_s", (), "the same learnt in turns, 0 until then"),
+    Column("course", (2,), "COGX, COGY of the last fix, Eqn 22"),
+    Column("fix_age_s", (), "time since a usable fix"),
+    Column("near_s", (), "how long the yaw error has been small"),
+    Column("locked", (), "1 once yaw was found", integer=True),
+    Column("yaw_applied_rad", (), "sum of proportional yaw corrections, where the history is free of them"),
+    Column("nose", (2,), "filtered horizontal nose, in the frame of the history"),
+    Column("nose_at_fix", (2,), "the same, as old as the last fix"),
+    Column("history_t_s", (HISTORY,), "when each remembered nose was"),
+    Column("history", (HISTORY, 2), "remembered filtered noses"),
+    Column("newest", (), "index of the newest of them", integer=True),
+)
+STATE_DTYPE = dtype_of(BELIEF + SCREEN + _PARAMS + _STATE)
+
+
+@kernel
+def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
+    """The rate to integrate: gyro less offset and plus corrections (Eqn 16); ``s.omega_b_rad_s`` is it without P."""
+    for i in range(3):
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
+    take_rate(row, s, good)
+    for i in range(3):
+        s.omega_total_b[i] = s.omega_b_rad_s[i] + s.omega_p_b[i]
+
+
+@kernel
+def filter_nose(s):  # type: ignore[no-untyped-def]
+    """Pass the horizontal nose through the receiver's filter and remember it: Paul's filter."""
+    # Seen in a frame that turns with the proportional yaw corrections, the nose knows the gyros alone.
+    c, z = np.cos(s.yaw_applied_rad), np.sin(s.yaw_applied_rad)
+    x = c * s.R_eb[0, 0] + z * s.R_eb[1, 0]
+    y = c * s.R_eb[1, 0] - z * s.R_eb[0, 0]
+    lagged = s.gps_lag_filter and s.gps_filter_s > 0.0
+    gain = 1.0 - np.exp(-s.dt_s / s.gps_filter_s) if lagged else 1.0
+    s.nose[0] += gain * (x - s.nose[0])
+    s.nose[1] += gain * (y - s.nose[1])
+    if s.clock_s - s.history_t_s[s.newest] >= SPACING_S:
+        s.newest = (s.newest + 1) % HISTORY
+        s.history_t_s[s.newest] = s.clock_s
+        s.history[s.newest, 0], s.history[s.newest, 1] = s.nose[0], s.nose[1]
+
+
+@kernel
+def recall_nose(s, t_s):  # type: ignore[no-untyped-def]
+    """Set ``s.nose_at_fix`` to the filtered nose at `t_s`, between two remembered ones; the oldest if none is so old."""
+    t1, x1, y1 = s.clock_s, s.nose[0], s.nose[1]
+    for back in range(HISTORY):
+        i = (s.newest - back) % HISTORY
+        t0, x0, y0 = s.history_t_s[i], s.history[i, 0], s.history[i, 1]
+        if t0 > t1:  # came round to a newer one: the previous was the oldest
+            break
+        if t0 <= t_s:
+            part = (t_s - t0) / (t1 - t0) if t1 > t0 else 1.0
+            x1, y1 = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
+            break
+        t1, x1, y1 = t0, x0, y0
+    s.nose_at_fix[0], s.nose_at_fix[1] = x1, y1
+
+
+@kernel
+def take_fix(row, s):  # type: ignore[no-untyped-def]
+    """Take course (Eqn 22) and speed of a fix that arrived, and the nose that belongs to it."""
+    s.fix_age_s += s.dt_s
+    if not row.gps_new:
+        return
+    course, speed = row.gps_course_rad, row.gps_speed_m_s
+    if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0):
+        s.rejected += 1
+        return
+    recall_nose(s, s.clock_s - s.gps_latency_s if s.gps_lag_filter else s.clock_s)
+    s.speed_m_s = speed
+    if s.gps_lag_filter:  # the filter that shortened the nose shortened the velocity alike
+        s.speed_m_s /= clip(np.hypot(s.nose_at_fix[0], s.nose_at_fix[1]), SHORTEST_NOSE, 1.0)
+    if speed >= s.min_speed_m_s:
+        s.fix_age_s = 0.0
+        s.course[0], s.course[1] = np.cos(course), np.sin(course)  # Eqn 22
+
+
+@kernel
+def yaw_correction(s):  # type: ignore[no-untyped-def]
+    """Fill ``s.yaw_b`` (Eqns 23 and 24); zero without a fresh fix."""
+    ground = 0.0
+    if s.fix_age_s <= FIX_LIFE_S:
+        # The nose of the fix, with all corrections since applied to it.
+        c, z = np.cos(s.yaw_applied_rad), np.sin(s.yaw_applied_rad)
+        x = c * s.nose_at_fix[0] - z * s.nose_at_fix[1]
+        y = z * s.nose_at_fix[0] + c * s.nose_at_fix[1]
+        ground = x * s.course[1] - y * s.course[0]  # Eqn 23
+        along = x * s.course[0] + y * s.course[1]
+        near = along > 0.0 and abs(ground) < np.tan(LOCK_RAD) * along
+        s.near_s = s.near_s + s.dt_s if near else 0.0
+        if s.near_s >= LOCK_S:
+            s.locked = 1
+        if along < 0.0:  # more than a right angle off: full strength
+            ground = np.copysign(np.hypot(x, y), ground)
+    for i in range(3):
+        s.yaw_b[i] = ground * s.R_eb[2, i]  # Eqn 24
+    if s.rotate_history:
+        s.yaw_applied_rad += s.k_p * s.w_y * ground * s.dt_s
+
+
+@kernel
+def learn_turn_speed(f, s):  # type: ignore[no-untyped-def]
+    """Learn the speed that makes Eqn 25's acceleration horizontal, while the turn is about the vertical."""
+    w, v = s.omega_b_rad_s, s.speed_m_s
+    around = w[0] * s.R_eb[2, 0] + w[1] * s.R_eb[2, 1] + w[2] * s.R_eb[2, 2]
+    across = w[1] * w[1] + w[2] * w[2]  # |omega x nose|^2
+    if v < s.min_speed_m_s or across < TURN_RAD_S**2 or around * around < 0.8 * (across + w[0] * w[0]):
+        return
+    # Level, g_ref stands upright on omega x nose = (0, w_z, -w_y): (-f + V omega x nose) . (omega x nose) = 0.
+    felt = clip((f[1] * w[2] - f[2] * w[1]) / across, 0.0, 3.0 * v)
+    if s.turn_speed_m_s == 0.0:
+        s.turn_speed_m_s = v
+    s.turn_speed_m_s += (1.0 - np.exp(-s.dt_s / TURN_S)) * (felt - s.turn_speed_m_s)
+
+
+@kernel
+def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
+    """Fill ``s.roll_pitch_b`` (Eqns 25 to 27, the last with its sign put right); zero outside the launch gate."""
+    f, w, v, g = row.force_b_m_s2, s.omega_b_rad_s, s.speed_m_s, s.g_ref_b_m_s2
+    if s.turn_speed:
+        learn_turn_speed(f, s)
+        v = s.turn_speed_m_s if s.turn_speed_m_s > 0.0 else v
+    # The paper's accelerometer is gravity minus acceleration, which is -f.  Eqn 25: omega x (v, 0, 0).
+    g[0] = -f[0]  # Eqn 26
+    g[1] = -f[1] + w[2] * v
+    g[2] = -f[2] - w[1] * v
+    length = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
+    believed = length > 0.0 and abs(length / G_M_S2 - 1.0) <= s.launch_gate
+    scale = 1.0 / length if believed else 0.0
+    x, y, z = s.R_eb[2, 0], s.R_eb[2, 1], s.R_eb[2, 2]
+    s.roll_pitch_b[0] = scale * (g[1] * z - g[2] * y)  # Eqn 27, corrected: reference x estimate
+    s.roll_pitch_b[1] = scale * (g[2] * x - g[0] * z)
+    s.roll_pitch_b[2] = scale * (g[0] * y - g[1] * x)
+
+
+@kernel
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One pass of the algorithm over row `k`.
+
+    Parameters
+    ----------
+    rows : shape (N,), MEASURED_DTYPE    not written
+    k : int                              the tick
+    state : shape (1,), STATE_DTYPE      read and written
+
+    Returns
+    -------
+    int    the `Health` of this tick's estimate
+    """
+    row, s = rows[k], state[0]
+    before = s.rejected
+    good = screen(row, s)
+    if good:
+        corrected_rate(row, s, good)
+        if not integrate(s.R_eb, s.omega_total_b, s.dt_s):  # Eqns 17-21
+            s.locked = 0
+        filter_nose(s)
+        take_fix(row, s)
+        yaw_correction(s)
+        if good & FORCE_GOOD:
+            roll_pitch_correction(row, s)
+        else:
+            s.roll_pitch_b[0] = s.roll_pitch_b[1] = s.roll_pitch_b[2] = 0.0
+        weigh(s.w_rp, s.roll_pitch_b, s.w_y, s.yaw_b, s.total_b)
+        feed_back(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
+    if s.rejected != before:
+        return 2  # Health.POOR
+    if not s.locked:
+        return 0  # Health.STARTING
+    return 1 if s.fix_age_s <= FIX_LIFE_S else 2  # Health.GOOD
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+
+
+class Premerlani(Compiled):
+    """The paper's estimator; see the module for what it adds and corrects.
+
+    Parameters
+    ----------
+    params : gains and options; the defaults suit a model aeroplane with a 1 s, 0.3 s late GPS
+    """
+
+    heading_reference: HeadingReference = "course"
+    _step: Any = staticmethod(step)
+    _replay: Any = staticmethod(_replay)
+
+    def __init__(self, params: PremerlaniParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or PremerlaniParams()
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
+
+        Without a sample (a start in the air), or where it is not of something at rest: offset zero, level.
+        """
+        s = self._state[0]
+        self._state.fill(0)
+        for f in fields(self.params):
+            s[f.name] = getattr(self.params, f.name)
+        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+        s["fix_age_s"] = math.inf
+        s["nose"] = s["nose_at_fix"] = s["history"] = s["R_eb"][:2, 0]

@@ -1,0 +1,205 @@
+"""The algebra of the direction cosine matrix: Eqns 2 and 17-21 of the paper, and how far two attitudes are apart.
+
+The kernels that run every tick work in place on one matrix.  The functions for logs and people take one matrix
+``(3, 3)`` or any stack of them ``(..., 3, 3)``.
+
+References
+----------
+W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from estimator.interface import Array
+from estimator.jit import kernel
+from estimator.kernels import wrap
+
+NEAR = 0.02  # within this of a unit length (squared) or of a right angle (cosine), Eqns 19 and 21 are good to 3e-4
+LONGEST_STEP_RAD = 0.2  # Eqn 17 wants steps that change little
+HOPELESS = 1e-6  # rows this short, or this parallel, no longer say where an axis points
+
+
+@kernel
+def propagate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
+    """Rotate the attitude by one gyro sample, in place (Eqn 17).
+
+    Parameters
+    ----------
+    R_eb : shape (3, 3)         body-to-earth rotation; not renormalised here, see `renormalise`
+    omega_b_rad_s : shape (3,)  drift-corrected rate, Eqn 16
+    dt_s : float                sample interval, > 0
+    """
+    x, y, z = omega_b_rad_s[0] * dt_s, omega_b_rad_s[1] * dt_s, omega_b_rad_s[2] * dt_s
+    for i in range(3):  # each row r becomes r + r x dtheta (Eqn 15)
+        a, b, c = R_eb[i, 0], R_eb[i, 1], R_eb[i, 2]
+        R_eb[i, 0] = a + b * z - c * y
+        R_eb[i, 1] = b - a * z + c * x
+        R_eb[i, 2] = c + a * y - b * x
+
+
+@kernel
+def _row_dot(R, i, j):  # type: ignore[no-untyped-def]
+    return R[i, 0] * R[j, 0] + R[i, 1] * R[j, 1] + R[i, 2] * R[j, 2]
+
+
+@kernel
+def _z_from_x_y(R):  # type: ignore[no-untyped-def]
+    """Set the Z row to the cross product of the X and Y rows (Eqn 20)."""
+    R[2, 0] = R[0, 1] * R[1, 2] - R[0, 2] * R[1, 1]
+    R[2, 1] = R[0, 2] * R[1, 0] - R[0, 0] * R[1, 2]
+    R[2, 2] = R[0, 0] * R[1, 1] - R[0, 1] * R[1, 0]
+
+
+@kernel
+def _scale_row(R, i, factor):  # type: ignore[no-untyped-def]
+    for j in range(3):
+        R[i, j] *= factor
+
+
+@kernel
+def renormalise(R_eb):  # type: ignore[no-untyped-def]
+    """Bring the matrix back to a rotation, in place (Eqns 18-21).
+
+    Eqns 19 and 21 hold for small errors.  A matrix further off than `NEAR` is put right by exact
+    orthogonalisation (Gram-Schmidt on the X and Y rows) instead.
+
+    Parameters
+    ----------
+    R_eb : shape (3, 3)   nearly a rotation
+
+    Returns
+    -------
+    bool    False where nothing can be saved (not finite, or X and Y rows vanishing or parallel); the matrix is
+            then left as it was, and the caller restarts from an attitude it trusts
+    """
+    xx, yy, error = _row_dot(R_eb, 0, 0), _row_dot(R_eb, 1, 1), _row_dot(R_eb, 0, 1)  # Eqn 18
+    if abs(xx - 1.0) < NEAR and abs(yy - 1.0) < NEAR and abs(error) < NEAR:
+        for j in range(3):
+            x, y = R_eb[0, j], R_eb[1, j]
+            R_eb[0, j] = x - 0.5 * error * y  # Eqn 19
+            R_eb[1, j] = y - 0.5 * error * x
+        _z_from_x_y(R_eb)  # Eqn 20
+        for i in range(3):
+            squared = _row_dot(R_eb, i, i)
+            near = abs(squared - 1.0) < NEAR
+            _scale_row(R_eb, i, 0.5 * (3.0 - squared) if near else 1.0 / np.sqrt(squared))  # Eqn 21
+        return True
+    # Written so that NaN is hopeless too; 1 - cosine^2 is the squared sine between the two rows.
+    if not (HOPELESS < xx < 1.0 / HOPELESS and HOPELESS < yy < 1.0 / HOPELESS):
+        return False
+    if not (1.0 - error * error / (xx * yy) > HOPELESS) or not np.isfinite(_row_dot(R_eb, 2, 2)):
+        return False
+    _scale_row(R_eb, 0, 1.0 / np.sqrt(xx))
+    error = _row_dot(R_eb, 0, 1)
+    for j in range(3):
+        R_eb[1, j] -= error * R_eb[0, j]
+    _scale_row(R_eb, 1, 1.0 / np.sqrt(_row_dot(R_eb, 1, 1)))
+    _z_from_x_y(R_eb)
+    return True
+
+
+@kernel
+def level(R_eb):  # type: ignore[no-untyped-def]
+    """Set the matrix to level, heading north, in place."""
+    for i in range(3):
+        for j in range(3):
+            R_eb[i, j] = 1.0 if i == j else 0.0
+
+
+@kernel
+def integrate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
+    """Propagate and renormalise, in place, in as many parts as Eqn 17 needs (one, up to 0.2 rad in a sample).
+
+    Never leaves the rotations: a matrix that cannot be saved becomes level, and the answer is then False.
+    """
+    x, y, z = omega_b_rad_s[0], omega_b_rad_s[1], omega_b_rad_s[2]
+    angle_rad = dt_s * np.sqrt(x * x + y * y + z * z)
+    parts = 1 + int(min(angle_rad / LONGEST_STEP_RAD, 1000.0))
+    for _ in range(parts):
+        propagate(R_eb, omega_b_rad_s, dt_s / parts)
+        if not renormalise(R_eb):
+            level(R_eb)
+            return False
+    return True
+
+
+@kernel
+def exp(rotation_vector: Array) -> Array:
+    """Rotation by the angle ``|rotation_vector|`` [rad] about its direction (Rodrigues), shape (3, 3)."""
+    x, y, z = rotation_vector[0], rotation_vector[1], rotation_vector[2]
+    squared = x * x + y * y + z * z
+    angle = np.sqrt(squared)
+    if angle > 1e-4:
+        a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / squared
+    else:  # the series, where the quotients lose their digits
+        a, b = 1.0 - squared / 6.0, 0.5 - squared / 24.0
+    R = np.empty((3, 3))
+    R[0, 0], R[0, 1], R[0, 2] = 1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y
+    R[1, 0], R[1, 1], R[1, 2] = b * x * y + a * z, 1.0 - b * (x * x + z * z), b * y * z - a * x
+    R[2, 0], R[2, 1], R[2, 2] = b * x * z - a * y, b * y * z + a * x, 1.0 - b * (x * x + y * y)
+    return R
+
+
+@kernel
+def log(R: Array) -> Array:
+    """Rotation vector of `R`, shape (3,), length 0..pi: the inverse of `exp`, good right up to half a turn."""
+    v = np.empty(3)
+    v[0], v[1], v[2] = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])
+    sine = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+    angle = np.arctan2(sine, cosine)
+    if cosine > -0.5:
+        return v * (angle / sine) if sine > 1e-10 else v
+    # Near half a turn the sine fades: take the axis from the symmetric part, n n^T (1 - cos), its sign from v.
+    i = 0
+    for j in range(1, 3):
+        if R[j, j] > R[i, i]:
+            i = j
+    n = np.empty(3)
+    for j in range(3):
+        n[j] = 0.5 * (R[i, j] + R[j, i])
+    n[i] -= cosine
+    n *= (-1.0 if v[i] < 0.0 else 1.0) / np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
+    return n * angle
+
+
+def from_euler(roll_rad: ArrayLike, pitch_rad: ArrayLike, yaw_rad: ArrayLike) -> Array:
+    """Body-to-earth rotation of yaw, then pitch, then roll (Eqn 2); broadcasts to shape (..., 3, 3)."""
+    roll, pitch, yaw = np.broadcast_arrays(*(np.asarray(a, np.float64) for a in (roll_rad, pitch_rad, yaw_rad)))
+    sr, cr, sp, cp, sy, cy = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch), np.sin(yaw), np.cos(yaw)
+    x = np.stack([cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy], axis=-1)
+    y = np.stack([cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy], axis=-1)
+    z = np.stack([-sp, sr * cp, cr * cp], axis=-1)
+    return np.stack([x, y, z], axis=-2)
+
+
+def to_euler(R_eb: Array) -> tuple[Array, Array, Array]:
+    """Roll, pitch, yaw [rad] of Eqn 2, each of shape (...); for people to read, never to compute with."""
+    pitch = np.arctan2(-R_eb[..., 2, 0], np.hypot(R_eb[..., 0, 0], R_eb[..., 1, 0]))
+    roll = np.arctan2(R_eb[..., 2, 1], R_eb[..., 2, 2])
+    return roll, pitch, heading_rad(R_eb)
+
+
+def heading_rad(R_eb: Array) -> Array:
+    """Direction of the nose over the ground, from north over east, -pi..pi; meaningless near the vertical."""
+    return np.asarray(np.arctan2(R_eb[..., 1, 0], R_eb[..., 0, 0]))
+
+
+def inclination_error_rad(R_estimated_eb: Array, R_true_eb: Array) -> Array:
+    """Angle between the two down axes seen from the body (the ``r_z`` rows), 0..pi, shape (...)."""
+    z_estimated, z_true = R_estimated_eb[..., 2, :], R_true_eb[..., 2, :]
+    sine = np.linalg.norm(np.cross(z_estimated, z_true), axis=-1)
+    return np.asarray(np.arctan2(sine, np.sum(z_estimated * z_true, axis=-1)))
+
+
+def heading_error_rad(R_estimated_eb: Array, R_true_eb: Array) -> Array:
+    """Estimated heading minus true heading, wrapped to -pi..pi, shape (...)."""
+    return np.asarray(wrap(heading_rad(R_estimated_eb) - heading_rad(R_true_eb)))
+
+
+def rotation_error_rad(R_estimated_eb: Array, R_true_eb: Array) -> Array:
+    """Angle of the one rotation that separates the two attitudes (geodesic on SO(3)), 0..pi, shape (...)."""
+    # ||A - B||_F = 2 sqrt(2) sin(angle / 2), and ||A + B||^2 completes it to the cosine: no lost digits anywhere.
+    apart = np.sum((R_estimated_eb - R_true_eb) ** 2, axis=(-2, -1)) / 8.0
+    return np.asarray(2.0 * np.arctan2(np.sqrt(apart), np.sqrt(np.maximum(1.0 - apart, 0.0))))

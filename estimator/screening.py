@@ -1,0 +1,107 @@
+"""Which samples are believed: every estimator meets NaN, spikes, repeated and lost samples in the same way.
+
+The state record of an estimator that uses this has the columns of `SCREEN` and of `compiled.BELIEF`.
+"""
+
+import math
+
+import numpy as np
+
+from estimator.interface import Array, Column, ImuSample
+from estimator.jit import kernel
+from estimator.rotation import from_euler
+
+G_M_S2 = 9.80665
+LONGEST_GAP_S = 0.5  # a longer silence says nothing of the attitude: the estimate goes on from where it was
+CLOCK_BACK_S = 1.0  # a time this far back is no late sample but a clock that was set
+COAST_S = 0.25  # how long the last good rate stands in for a broken gyro
+AT_REST_RAD_S, AT_REST_G = math.radians(20.0), 0.2  # mean samples further off are not of something at rest
+GYRO_RANGE_RAD_S = math.radians(2100.0)  # readings beyond are no measurement: just more than the largest parts have
+FORCE_RANGE_M_S2 = 17.0 * G_M_S2
+
+PASSED, GYRO_GOOD, FORCE_GOOD = 1, 2, 4  # bits of what `screen` answers: time passed, and what to believe
+ALL_GOOD = 7
+
+SCREEN = (
+    Column("gyro_range_rad_s", (), "a rate beyond this is no measurement"),
+    Column("force_range_m_s2", (), "a specific force beyond this is no measurement"),
+    Column("started", (), "1 once a sample was accepted", integer=True),
+    Column("t_s", (), "time of the last accepted sample, by the clock of the samples"),
+    Column("clock_s", (), "time lived through; never runs back"),
+    Column("dt_s", (), "time that this tick accounts for"),
+    Column("bad_s", (), "how long the gyro has been broken"),
+    Column("rejected", (), "ticks in which something was not believed", integer=True),
+)
+
+
+@kernel
+def _within(a, limit):  # type: ignore[no-untyped-def]
+    """Whether all three components are within +-limit; NaN is not."""
+    return abs(a[0]) <= limit and abs(a[1]) <= limit and abs(a[2]) <= limit
+
+
+@kernel
+def _interval_s(row, s):  # type: ignore[no-untyped-def]
+    """How much time this sample accounts for; 0 where its time or interval cannot be."""
+    t, dt = row.t_s, row.dt_s
+    if not (np.isfinite(t) and 0.0 < dt <= LONGEST_GAP_S):
+        return 0.0
+    if s.started:
+        gap = t - s.t_s
+        if gap < -CLOCK_BACK_S:
+            s.t_s = t  # this sample is lost, the next one counts
+        if gap <= 0.0:
+            return 0.0
+        if 1.5 * dt < gap <= LONGEST_GAP_S:
+            dt = gap  # samples were lost: this one stands for them
+    s.started = 1
+    s.t_s = t
+    return dt
+
+
+@kernel
+def screen(row, s):  # type: ignore[no-untyped-def]
+    """Judge the inertial sample of `row`, set ``s.dt_s``, count a rejection.
+
+    Returns
+    -------
+    int    0 where no time has passed, else PASSED with GYRO_GOOD and FORCE_GOOD as far as they are
+    """
+    s.dt_s = _interval_s(row, s)
+    good = 0
+    if s.dt_s > 0.0:
+        good = PASSED
+        s.clock_s += s.dt_s
+        s.bad_s += s.dt_s
+        if _within(row.gyro_b_rad_s, s.gyro_range_rad_s):
+            good |= GYRO_GOOD
+            s.bad_s = 0.0
+        if _within(row.force_b_m_s2, s.force_range_m_s2):
+            good |= FORCE_GOOD
+    if good != ALL_GOOD:
+        s.rejected += 1
+    return good
+
+
+@kernel
+def take_rate(row, s, good):  # type: ignore[no-untyped-def]
+    """Set ``s.omega_b_rad_s``: gyro less believed bias; the last one where the gyro broke, zero if that lasts."""
+    for i in range(3):
+        if good & GYRO_GOOD:
+            s.omega_b_rad_s[i] = row.gyro_b_rad_s[i] - s.gyro_bias_b_rad_s[i]
+        elif s.bad_s > COAST_S:
+            s.omega_b_rad_s[i] = 0.0
+
+
+def offset_at_rest(sample: ImuSample) -> Array:
+    """Gyro offset from the mean sample of something standing or held, shape (3,), rad/s; zero if it is not that."""
+    offset = np.array(sample.gyro_b_rad_s, np.float64)
+    return offset if np.all(np.abs(offset) < AT_REST_RAD_S) else np.zeros(3)
+
+
+def attitude_at_rest(sample: ImuSample) -> Array:
+    """Tilt from the mean sample of something standing or held, heading north, shape (3, 3); level if it is not that."""
+    x, y, z = (-float(f) for f in sample.force_b_m_s2)  # the pull of gravity, seen from the body
+    if not abs(math.hypot(x, y, z) / G_M_S2 - 1.0) < AT_REST_G:
+        return np.eye(3)
+    return from_euler(math.atan2(y, z), math.atan2(-x, math.hypot(y, z)), 0.0)

@@ -1,0 +1,58 @@
+"""What there is to fly, told without importing any of it: a listing must not wait for compilers and engines."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+from scenarios.harness import plugins
+
+_ROOT = Path(__file__).resolve().parents[2]
+
+
+def catalogue() -> dict[str, dict[str, str]]:
+    """Everything that has a name on the command line: kind -> name -> one line about it, names in order."""
+    found = {
+        "scenarios": {p.stem: _first_line(_tree(p)) for p in (_ROOT / "scenarios").glob("[!_]*.py")},
+        "estimators": {name: _about(where) for name, where in plugins.estimators().items()},
+        "autopilots": {name: _about(where) for name, where in plugins.autopilots().items()},
+        "aircraft": {p.name: _aircraft(p) for p in (_ROOT / "sim" / "aircraft").iterdir() if _is_aircraft(p)},
+        "sensor suites": dict(_suites(_tree(_ROOT / "sim" / "sensors" / "suite.py"))),
+    }
+    return {kind: dict(sorted(things.items())) for kind, things in found.items()}
+
+
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def _first_line(node: ast.Module | ast.ClassDef) -> str:
+    return (ast.get_docstring(node) or "").partition("\n")[0]
+
+
+def _about(where: str) -> str:
+    """First line of the docstring of the class at ``module:Class``; the place itself where it is not ours."""
+    module, _, name = where.partition(":")
+    path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
+    if not path.is_file():
+        return where
+    classes = (node for node in _tree(path).body if isinstance(node, ast.ClassDef) and node.name == name)
+    return next((_first_line(node) for node in classes), where)
+
+
+def _is_aircraft(folder: Path) -> bool:
+    return (folder / f"{folder.name}.xml").is_file()
+
+
+def _aircraft(folder: Path) -> str:
+    package = folder / "__init__.py"
+    return _first_line(_tree(package)) if package.is_file() else ""
+
+
+def _suites(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """Names of the dict literal inside ``SUITES = ...``."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "SUITES" for t in node.targets):
+            for literal in ast.walk(node.value):
+                if isinstance(literal, ast.Dict):
+                    yield from ((str(ast.literal_eval(key)), "") for key in literal.keys if key is not None)
+                    return

@@ -1,0 +1,277 @@
+"""The configuration of one flight: what flies, where from, through what air, with which sensors, for how long.
+
+A configuration may leave things to chance (``"random"``).  `resolve` draws them once, each from its named stream,
+into plain numbers; the resolved configuration goes into the manifest, and the flight can be flown again from it.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from scenarios.harness.fitted import dotted_fields, suite_params
+from scenarios.harness.plugins import near_misses
+from scenarios.harness.validation import validated
+from sim.clock import Rates
+from sim.rng import stream
+
+FASTEST_WIND_M_S = 30.0
+Chance = Literal["random"]
+Triple = tuple[float, float, float]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class RatesConfig(_Model):
+    """Rates in hertz; the slower ones divide the physics rate (`sim.clock.Rates`)."""
+
+    physics_hz: int = 200
+    imu_hz: int = 50
+    gps_hz: float = 4.0
+
+    @model_validator(mode="after")
+    def _divide(self) -> "RatesConfig":
+        self.build()
+        return self
+
+    def build(self) -> Rates:
+        """The clock of these rates."""
+        return Rates(self.physics_hz, self.imu_hz, self.gps_hz)
+
+
+class AirConfig(_Model):
+    """Steady wind, with the direction it blows FROM, and turbulence.
+
+    wind_from_deg : from north over east; "random" any direction; "cross" from the left or the right of the start
+    turbulence_w20_m_s : wind speed at 20 ft that scales the turbulence, MIL-F-8785C; 0 is none
+    """
+
+    wind_m_s: float = Field(default=0.0, ge=0.0, le=FASTEST_WIND_M_S)
+    wind_from_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Literal["random", "cross"] = 0.0
+    turbulence_w20_m_s: float = Field(default=0.0, ge=0.0, le=FASTEST_WIND_M_S)
+
+
+class InFlightStart(_Model):
+    """Start in trimmed level flight, `out_m` from the launch point in the direction of the heading."""
+
+    kind: Literal["in_flight"] = "in_flight"
+    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
+    height_m: float = Field(default=60.0, gt=0.0, le=3000.0)
+    out_m: float = Field(default=0.0, ge=0.0, le=5000.0)
+    airspeed_m_s: float | None = Field(default=None, gt=0.0)
+
+
+class HandMotion(_Model):
+    """How the hand moved: a_i sin(2 pi f_i t + phase_i) in rate about roll, pitch and yaw, and the twist it gave."""
+
+    sway_deg_s: Triple
+    sway_hz: Triple
+    sway_phase_deg: Triple
+    release_rate_deg_s: Triple
+
+
+class HandThrowStart(_Model):
+    """Start in a hand at the launch point, then thrown.
+
+    sway_deg_s : largest rate of the hand about each axis     release_rate_deg_s : sigma of the twist, each axis
+    hand : "random" draws the motion from these two; a resolved configuration holds what was drawn
+    calibration_s : from power-up, over which the gyro offset is measured in the hand
+    """
+
+    kind: Literal["hand_throw"] = "hand_throw"
+    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
+    pitch_deg: float = Field(default=10.0, ge=-30.0, le=60.0)
+    height_m: float = Field(default=1.7, gt=0.0, le=3.0)
+    hold_s: float = Field(default=8.0, gt=0.0, le=600.0)
+    push_m_s2: float = Field(default=27.0, gt=0.0, le=100.0)
+    push_s: float = Field(default=0.3, gt=0.0, le=2.0)
+    sway_deg_s: float = Field(default=3.0, ge=0.0, le=60.0)
+    release_rate_deg_s: float = Field(default=15.0, ge=0.0, le=90.0)
+    calibration_s: float = Field(default=2.0, ge=0.0)
+    hand: HandMotion | Chance = "random"
+
+    @model_validator(mode="after")
+    def _calibrate_in_the_hand(self) -> "HandThrowStart":
+        if self.calibration_s > self.hold_s:
+            raise ValueError(
+                f"calibration_s = {self.calibration_s:g} s: at most hold_s, the {self.hold_s:g} s in the hand"
+            )
+        return self
+
+
+class FlightConfig(_Model):
+    """Everything that decides a flight, beside the code.
+
+    estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
+    estimator_params : fields of the estimator's parameter dataclass
+    duration_s : after the release          suite, sensors : name of the suite, and fields changed in it by their
+    dotted names, ``{"gps.latency_s": 1.0}``            manoeuvre : the scenario's own parameters
+    seed, flight : campaign and number of the flight in it, which name the random streams
+    """
+
+    aircraft: str = "endurance"
+    estimator: str = "premerlani"
+    estimator_params: dict[str, Any] = Field(default_factory=dict)
+    autopilot: str = "dcm"
+    duration_s: float = Field(default=60.0, gt=0.0, le=36000.0)
+    rates: RatesConfig = Field(default_factory=RatesConfig)
+    suite: str = "generic"
+    sensors: dict[str, float] = Field(default_factory=dict)
+    air: AirConfig = Field(default_factory=AirConfig)
+    start: Annotated[InFlightStart | HandThrowStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
+    manoeuvre: dict[str, float] = Field(default_factory=dict)
+    seed: int = Field(default=0, ge=0)
+    flight: int = Field(default=0, ge=0)
+
+    @property
+    def heading_deg(self) -> float:
+        """Heading at the start; ValueError where it has not been drawn yet."""
+        heading_deg = self.start.heading_deg
+        if isinstance(heading_deg, str):
+            raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
+        return heading_deg
+
+
+class Wind(NamedTuple):
+    """Speed of the wind and where it comes from."""
+
+    m_s: float
+    from_deg: float | Literal["random", "cross"]
+
+
+def parse_wind(text: str) -> Wind:
+    """Wind of what a person types: ``5@270`` is 5 m/s from the west.
+
+    Also ``5@random``, ``5@cross`` (from the left or the right of the start heading), and ``0`` or ``calm``.
+
+    Raises
+    ------
+    ValueError      naming what would be right
+    """
+    tidy = text.strip().lower()
+    if tidy in ("0", "calm"):
+        return Wind(0.0, 0.0)
+    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)@(random|cross|\d+(?:\.\d*)?)", tidy)
+    right = "write speed@direction it comes from, for instance 5@270, 5@random or 5@cross, or calm"
+    if not found:
+        raise ValueError(f"wind = {text!r}: {right}")
+    m_s, direction = float(found[1]), found[2]
+    if m_s > FASTEST_WIND_M_S:
+        raise ValueError(f"wind = {text!r}: {m_s:g} m/s is too much, at most {FASTEST_WIND_M_S:g} m/s")
+    if direction == "random":
+        return Wind(m_s, "random")
+    if direction == "cross":
+        return Wind(m_s, "cross")
+    if float(direction) > 360.0:
+        raise ValueError(f"wind = {text!r}: direction {direction} deg is outside 0 to 360 deg; {right}")
+    return Wind(m_s, float(direction))
+
+
+def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig:
+    """`config` with fields changed by their dotted names; values may be text, as from a command line.
+
+    ``wind`` takes what `parse_wind` takes; ``gps.``, ``gyro.`` and ``accelerometer.`` are short for ``sensors.gps.``
+    and so on.
+
+    Raises
+    ------
+    ValueError      one line with the field, the value, its unit and what would be right
+    """
+    data = config.model_dump()
+    for name, value in overrides.items():
+        if name == "wind":
+            wind = parse_wind(str(value))
+            data["air"] |= {"wind_m_s": wind.m_s, "wind_from_deg": wind.from_deg}
+        else:
+            _put(data, _full_name(name, config), value)
+    changed = validated(FlightConfig, data)
+    suite_params(changed.suite, changed.sensors)  # refuses a suite or a value that cannot be
+    return changed
+
+
+def _full_name(name: str, config: FlightConfig) -> str:
+    """Dotted name of a field that exists, or a ValueError with those that come near."""
+    fields = dotted_fields(suite_params(config.suite, {}))
+    if name in fields:
+        return f"sensors.{name}"
+    open_ended = name.startswith("estimator_params.")  # the estimator's own dataclass checks these
+    known = [*_dotted(config), *(f"sensors.{f}" for f in fields), "wind"]
+    if name not in known and not open_ended:
+        raise ValueError(f"unknown parameter {name!r}: {near_misses(name, [*known, *fields])}")
+    return name
+
+
+def _dotted(config: FlightConfig) -> list[str]:
+    """Names of the fields that one may change."""
+    names: list[str] = []
+    for name, value in config:
+        if isinstance(value, BaseModel):
+            names += [f"{name}.{inner}" for inner in type(value).model_fields if inner != "kind"]
+        elif name == "manoeuvre":
+            names += [f"{name}.{inner}" for inner in value]
+        elif name not in ("sensors", "estimator_params"):
+            names.append(name)
+    return names
+
+
+def _put(data: dict[str, Any], name: str, value: Any) -> None:
+    """Set the field of dotted `name`; what follows ``sensors.`` is one key."""
+    head, _, rest = name.partition(".")
+    if not rest:
+        data[head] = value
+    elif head == "estimator_params":
+        data[head] = {**data[head], rest: _literal(value)}
+    else:
+        data[head] = {**data[head], rest: value}
+
+
+def _literal(value: Any) -> Any:
+    """Number, truth value or list that `value` spells, else the text itself."""
+    try:
+        return json.loads(value) if isinstance(value, str) else value
+    except json.JSONDecodeError:
+        return value
+
+
+def resolve(config: FlightConfig) -> FlightConfig:
+    """`config` with everything that was left to chance drawn, each from its named stream; idempotent."""
+    start = _resolve_start(config)
+    from_deg = config.air.wind_from_deg
+    if isinstance(from_deg, str):
+        draw = stream(config.seed, config.flight, "wind_direction").random()
+        from_deg = (
+            360.0 * draw if from_deg == "random" else (start.heading_deg + (90.0 if draw < 0.5 else 270.0)) % 360.0
+        )
+    air = config.air.model_copy(update={"wind_from_deg": float(from_deg)})
+    return config.model_copy(update={"start": start, "air": air})
+
+
+def _resolve_start(config: FlightConfig) -> Any:
+    start: InFlightStart | HandThrowStart = config.start
+    if start.heading_deg == "random":
+        heading_deg = 360.0 * float(stream(config.seed, config.flight, "start_heading").random())
+        start = start.model_copy(update={"heading_deg": heading_deg})
+    if isinstance(start, HandThrowStart) and start.hand == "random":
+        start = start.model_copy(update={"hand": _draw_hand(config, start)})
+    return start
+
+
+def _draw_hand(config: FlightConfig, start: HandThrowStart) -> HandMotion:
+    """The hand sways as slowly as an arm does, 0.4 to 1.2 Hz; the twist is normal, cut off at two sigma."""
+    rng = stream(config.seed, config.flight, "hand")
+    sway = start.sway_deg_s * rng.uniform(0.5, 1.0, 3)
+    hz, phase = rng.uniform(0.4, 1.2, 3), rng.uniform(0.0, 360.0, 3)
+    twist = start.release_rate_deg_s * np.clip(rng.standard_normal(3), -2.0, 2.0)
+    return HandMotion(
+        sway_deg_s=_triple(sway), sway_hz=_triple(hz), sway_phase_deg=_triple(phase), release_rate_deg_s=_triple(twist)
+    )
+
+
+def _triple(values: np.ndarray) -> Triple:
+    x, y, z = (float(v) for v in values)
+    return x, y, z

@@ -1,0 +1,144 @@
+"""From a configuration to a flight: builds the aeroplane, its air, sensors, estimator and autopilot, and flies."""
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import is_dataclass, replace
+from typing import Any
+
+from autopilot.interface import Autopilot
+from estimator.interface import AttitudeEstimator
+from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, override, resolve
+from scenarios.harness.fitted import changed, suite_params
+from scenarios.harness.plugins import load_autopilot, load_estimator
+from scenarios.harness.scenario import Scenario
+from sim.air import Air
+from sim.jsbsim_plant import JsbsimPlant
+from sim.log import Flight, Log
+from sim.loop import Watch, fly
+from sim.plant import HandThrow, InFlight, Start
+from sim.sensors.suite import Suite
+
+Maker = Callable[[], AttitudeEstimator]
+
+
+def fly_scenario(
+    scenario: Scenario,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    seed: int = 0,
+    flight: int = 0,
+    estimator: str | Maker | None = None,
+    watch: Watch | None = None,
+) -> Flight:
+    """Fly `scenario` once.
+
+    Parameters
+    ----------
+    overrides       fields of the configuration by dotted names, see `config.override`
+    seed, flight    name the random streams
+    estimator       name, ``module:Class``, ``file.py:Class`` or a class; None is the scenario's own
+    watch           called once a simulated second, see `sim.loop.fly`
+
+    Raises
+    ------
+    ValueError      one line: what is wrong with the configuration; nothing has been flown then
+    """
+    changes: dict[str, Any] = {**(overrides or {}), "seed": seed, "flight": flight}
+    maker = None if isinstance(estimator, str) else estimator
+    if maker is not None:
+        changes["estimator"] = f"{maker.__module__}:{getattr(maker, '__qualname__', type(maker).__name__)}"
+    elif estimator is not None:
+        changes["estimator"] = estimator
+    return fly_config(scenario, override(scenario.config, changes), maker=maker, watch=watch)
+
+
+def fly_config(
+    scenario: Scenario, config: FlightConfig, *, maker: Maker | None = None, watch: Watch | None = None
+) -> Flight:
+    """Fly `scenario` under `config`, drawing what it leaves to chance.
+
+    The resolved configuration is the manifest's ``config``: ``fly_config(scenario, FlightConfig(**that))`` flies
+    the same flight again.
+    """
+    config = resolve(config)
+    rates = config.rates.build()
+    suite = Suite(suite_params(config.suite, config.sensors), rates, config.seed, config.flight)
+    estimator = maker() if maker is not None else _estimator(config)
+    pilot = _autopilot(config.autopilot, getattr(estimator, "heading_reference", "course"))
+    script = scenario.script(config)
+    plant = JsbsimPlant(
+        config.aircraft, start=start_of(config), air=air_of(config), rates=rates, seed=config.seed, flight=config.flight
+    )
+    thrown = isinstance(config.start, HandThrowStart)
+    flown = fly(
+        plant,
+        suite,
+        estimator,
+        pilot,
+        script,
+        Log.empty(rates.ticks(plant.release_s + config.duration_s)),
+        calibration_s=config.start.calibration_s if isinstance(config.start, HandThrowStart) else 0.0,
+        manifest={"scenario": scenario.name, "thrown": thrown, "config": config.model_dump(mode="json")},
+        watch=watch,
+    )
+    events = sorted((*flown.events, *scenario.events(flown)), key=lambda event: event.t_s)
+    return replace(flown, events=tuple(events))
+
+
+def start_of(config: FlightConfig) -> Start:
+    """The plant's start of a resolved configuration."""
+    start, heading_rad = config.start, math.radians(config.heading_deg)
+    if not isinstance(start, HandThrowStart):
+        north_m, east_m = start.out_m * math.cos(heading_rad), start.out_m * math.sin(heading_rad)
+        return InFlight(heading_rad, start.height_m, north_m, east_m, start.airspeed_m_s)
+    hand = start.hand
+    if not isinstance(hand, HandMotion):
+        raise ValueError(f"start.hand = {hand!r}: resolve the configuration first")
+    return HandThrow(
+        heading_rad,
+        math.radians(start.pitch_deg),
+        _radians(hand.sway_deg_s),
+        hand.sway_hz,
+        _radians(hand.sway_phase_deg),
+        _radians(hand.release_rate_deg_s),
+        start.height_m,
+        start.hold_s,
+        start.push_m_s2,
+        start.push_s,
+    )
+
+
+def air_of(config: FlightConfig) -> Air:
+    """The air of a resolved configuration; people type where the wind comes from, `Air` wants where it goes."""
+    from_deg = config.air.wind_from_deg
+    if isinstance(from_deg, str):
+        raise ValueError(f"air.wind_from_deg = {from_deg!r}: resolve the configuration first")
+    from_rad, m_s = math.radians(from_deg), config.air.wind_m_s
+    wind_e_m_s = (-m_s * math.cos(from_rad), -m_s * math.sin(from_rad), 0.0)
+    return Air(wind_e_m_s=wind_e_m_s, turbulence_w20_m_s=config.air.turbulence_w20_m_s)
+
+
+def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (math.radians(d) for d in degrees)
+    return x, y, z
+
+
+def _estimator(config: FlightConfig) -> AttitudeEstimator:
+    """The estimator by name, its parameter dataclass changed where the configuration says so."""
+    estimator = load_estimator(config.estimator)
+    if not config.estimator_params:
+        return estimator
+    params = getattr(estimator, "params", None)
+    if not is_dataclass(params):
+        raise ValueError(f"estimator {config.estimator!r} has no parameters (a dataclass in its attribute params)")
+    what = f"estimator {config.estimator}"
+    return type(estimator)(changed(params, config.estimator_params, what))  # type: ignore[call-arg]
+
+
+def _autopilot(name: str, heading_reference: str) -> Autopilot:
+    """The autopilot by name; one that wants to know what the estimator's heading means is told."""
+    autopilot = load_autopilot(name)
+    if "heading_reference" in inspect.signature(type(autopilot)).parameters:
+        return type(autopilot)(heading_reference=heading_reference)  # type: ignore[call-arg]
+    return autopilot

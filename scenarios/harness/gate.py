@@ -1,0 +1,120 @@
+"""Many flights judged: every scenario on every seed, over several processes, the same whatever their number.
+
+A flight is decided by its scenario, its overrides and its seed alone, and the verdicts are put together in the order
+in which the flights were named, so neither the number of workers nor their speed shows in the result.
+"""
+
+import multiprocessing
+import re
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from typing import Any
+
+from scenarios.harness.flight import fly_scenario
+from scenarios.harness.registry import find
+from scenarios.harness.verdict import FlightVerdict, Verdict, judge
+from sim.log import Outcome
+
+LARGEST_SEED = 2**32 - 1
+
+
+class Interrupted(Exception):
+    """Ctrl-C; `verdict` holds the flights that had been finished."""
+
+    def __init__(self, verdict: Verdict) -> None:
+        super().__init__(f"interrupted after {len(verdict.flights)} flights")
+        self.verdict = verdict
+
+
+class WorkerDied(RuntimeError):
+    """A worker process was killed from outside, so that flights are missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One flight to be flown, by names, so that it can be sent to a process."""
+
+    scenario: str
+    seed: int
+    estimator: str | None
+    overrides: Mapping[str, Any]
+
+    def fly(self) -> FlightVerdict:
+        """Fly it and judge it."""
+        scenario = find(self.scenario)
+        return judge(scenario, fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator))
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Seeds of what a person types: ``0-9``, ``3``, ``0,2,5-7``; each once, in that order.
+
+    Raises
+    ------
+    ValueError      naming what would be right
+    """
+    right = "write numbers and ranges, for instance 0-9 or 0,2,5-7"
+    seeds: dict[int, None] = {}
+    for part in text.split(","):
+        found = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)
+        if not found:
+            raise ValueError(f"seeds = {text!r}: {right}")
+        first, last = int(found[1]), int(found[2] or found[1])
+        if not first <= last <= LARGEST_SEED:
+            raise ValueError(f"seeds = {text!r}: {part.strip()} is no range of seeds from 0 to {LARGEST_SEED}; {right}")
+        if last - first >= 1_000_000:
+            raise ValueError(f"seeds = {text!r}: {last - first + 1} flights at once are too many; split them")
+        seeds |= dict.fromkeys(range(first, last + 1))
+    return list(seeds)
+
+
+def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], None]) -> Verdict:
+    """Fly and judge all `tasks`; `advance` is told how many are done, of how many.
+
+    Raises
+    ------
+    Interrupted     on Ctrl-C      WorkerDied   where a process was killed      ValueError   as `fly_scenario` does
+    """
+    done: dict[int, FlightVerdict] = {}
+
+    def keep(i: int, verdict: FlightVerdict) -> None:
+        if verdict.outcome == Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        done[i] = verdict
+        advance(len(done), len(tasks))
+
+    try:
+        if workers == 1:
+            for i, task in enumerate(tasks):
+                keep(i, task.fly())
+        else:
+            _fly_over_processes(tasks, workers, keep)
+    except KeyboardInterrupt:
+        raise Interrupted(_in_order(tasks, done)) from None
+    return _in_order(tasks, done)
+
+
+def _fly_over_processes(tasks: Sequence[Task], workers: int, keep: Callable[[int, FlightVerdict], None]) -> None:
+    # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
+    context = multiprocessing.get_context("spawn")
+    workers = min(workers, len(tasks))
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent) as pool:
+        waiting: dict[Future[FlightVerdict], int] = {pool.submit(task.fly): i for i, task in enumerate(tasks)}
+        try:
+            while waiting:
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    keep(waiting.pop(future), future.result())
+        except BrokenProcessPool as error:
+            raise WorkerDied(f"a worker process died with {len(waiting)} flights to go; try fewer --workers") from error
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _leave_interrupts_to_the_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _in_order(tasks: Sequence[Task], done: Mapping[int, FlightVerdict]) -> Verdict:
+    return Verdict.of((find(tasks[i].scenario), done[i]) for i in sorted(done))

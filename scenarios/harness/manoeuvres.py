@@ -1,0 +1,105 @@
+"""Manoeuvres found in the truth of a flight: turns with their roll-outs, and loops.
+
+What a manoeuvre is judged by must not depend on what the estimator believed or on what the script asked for.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import Array
+from scenarios.harness.metrics import Measured, Metric, Moment, SeriesOf, highest, settled_after_s, time_s
+from sim.log import Flight
+
+
+def bank_rad(flight: Flight) -> Array:
+    """True bank angle, -pi..pi, shape (n,)."""
+    R = flight.log.truth["R_eb"]
+    return np.arctan2(R[:, 2, 1], R[:, 2, 2])
+
+
+@dataclass(frozen=True, slots=True)
+class RollOut:
+    """The end of a turn: when the bank fell below 10 degrees, and when the next turn (or the end) began."""
+
+    t_s: float
+    until_s: float
+
+
+def roll_outs(flight: Flight, steep_deg: float = 25.0, level_deg: float = 10.0, held_s: float = 1.0) -> list[RollOut]:
+    """Roll-outs of the turns truly flown, in order of time.
+
+    A turn is a bank above `steep_deg` to one side for at least `held_s`; it begins where the bank last rose
+    through `level_deg` before that, and ends where the bank next falls below it.
+    """
+    t_s, bank = time_s(flight), np.degrees(bank_rad(flight))
+    level = np.flatnonzero(np.abs(bank) < level_deg)
+    begins, ends = [], []
+    for first, last in _runs(bank > steep_deg) + _runs(bank < -steep_deg):
+        if (last - first + 1) * flight.dt_s < held_s:
+            continue
+        before, later = level[level < first], level[level > last]
+        begins.append(t_s[before[-1]] if len(before) else t_s[0])
+        if len(later):
+            ends.append(t_s[later[0]])
+    begins = sorted(begins)
+    last_s = float(t_s[-1]) if len(t_s) else math.nan
+    return [RollOut(float(e), next((float(b) for b in begins if b > e), last_s)) for e in sorted(set(ends))]
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of every run of True."""
+    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+
+
+def slowest_recovery(series: SeriesOf, limit: float, turns: int, within_s: float) -> Metric:
+    """Metric: the longest time after a roll-out until `series` stays at or below `limit` up to the next turn, s.
+
+    Only roll-outs that are followed by at least `within_s` of flight count; `turns` of them are expected.
+    """
+
+    def metric(flight: Flight) -> Measured:
+        errors = series(flight)
+        watched = [r for r in roll_outs(flight) if r.until_s - r.t_s >= within_s]
+        times = [settled_after_s(errors.within(r.t_s, r.until_s), limit) for r in watched]
+        return Measured(highest(np.array(times)), len(times), turns)
+
+    return metric
+
+
+def turns_of_pitch(flight: Flight) -> Array:
+    """Turns of the nose in the vertical plane it flew in at the release: 1 after an inside loop, shape (n,).
+
+    The angle of the nose is taken in the plane of the vertical and the initial heading, so that a roll in between
+    counts nothing.
+    """
+    nose = flight.log.truth["R_eb"][:, :, 0]
+    k0 = int(np.searchsorted(time_s(flight), 0.0))
+    if k0 >= len(nose):
+        return np.zeros(len(nose))
+    ahead = nose[k0, :2] / np.linalg.norm(nose[k0, :2])
+    angle = np.unwrap(np.arctan2(-nose[:, 2], nose[:, :2] @ ahead))
+    return (angle - angle[k0]) / (2.0 * np.pi)
+
+
+def turns_that_count(loops: int) -> float:
+    """Turns of the nose that count as `loops` whole ones: the last may end 20 degrees short of level."""
+    return loops - 20.0 / 360.0
+
+
+def loops_end_s(loops: int) -> Moment:
+    """The moment at which the nose has come round `loops` times: the pull is over."""
+
+    def moment(flight: Flight) -> float:
+        done = np.flatnonzero(turns_of_pitch(flight) >= turns_that_count(loops))
+        return float(time_s(flight)[done[0]]) if len(done) else math.nan
+
+    return moment
+
+
+def most_loops(flight: Flight) -> Measured:
+    """Metric: how often the nose came round, turns."""
+    return Measured(highest(turns_of_pitch(flight)))

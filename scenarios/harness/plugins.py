@@ -1,0 +1,202 @@
+"""Flight code by name: estimators and autopilots of this project, of the person at the keyboard, of other packages.
+
+A name is one of
+
+``premerlani``        a name of the registry, or of an installed package that offers an entry point in the group
+                      ``wingslevel.estimators`` or ``wingslevel.autopilots``
+``package.module:Class``   anything that can be imported, also from the working directory
+``path/to/file.py:Class``  a file
+
+The class is called anew for each flight, without arguments (an autopilot's is given the ``heading_reference`` of the
+estimator where it asks for it).  Only ``update`` is required of it.
+"""
+
+import difflib
+import importlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Iterable, Mapping
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
+    from autopilot.interface import Autopilot
+    from estimator.interface import AttitudeEstimator, HeadingReference
+
+ESTIMATORS: Mapping[str, str] = MappingProxyType(
+    {
+        "premerlani": "estimator.premerlani:Premerlani",
+        "gyro_only": "estimator.baselines:GyroOnly",
+        "oracle": "sim.oracle:Oracle",
+    }
+)
+AUTOPILOTS: Mapping[str, str] = MappingProxyType({"dcm": "autopilot.autopilot:DcmAutopilot"})
+
+
+class _Kind(NamedTuple):
+    """What is looked up: its word for messages, our registry, the group of entry points, arguments of `update`."""
+
+    word: str
+    registry: Mapping[str, str]
+    group: str
+    arguments: tuple[str, ...]
+
+
+_ESTIMATOR = _Kind("estimator", ESTIMATORS, "wingslevel.estimators", ("measurements",))
+_AUTOPILOT = _Kind("autopilot", AUTOPILOTS, "wingslevel.autopilots", ("estimate", "measurements", "setpoint"))
+
+
+class PluginError(ValueError):
+    """Flight code that cannot be found, loaded or used; the message is one line."""
+
+
+def near_misses(name: str, names: Iterable[str]) -> str:
+    """The end of a message about an unknown `name`: what it may have meant, or all there is."""
+    possible = sorted(names)
+    close = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
+
+
+def estimators() -> dict[str, str]:
+    """Names of all estimators that need no path, with where each one comes from."""
+    return _offered(_ESTIMATOR)
+
+
+def autopilots() -> dict[str, str]:
+    """Names of all autopilots that need no path, with where each one comes from."""
+    return _offered(_AUTOPILOT)
+
+
+def load_estimator(spec: str) -> "AttitudeEstimator":
+    """A new estimator by name, ``module:Class`` or ``file.py:Class``.
+
+    Raises
+    ------
+    PluginError
+        In one line: nothing of that name (with the near misses), code that cannot be imported or constructed, no
+        ``update(measurements)``, or a ``heading_reference`` that is neither "course" nor "nose".
+    """
+    estimator = _load(_ESTIMATOR, spec)
+    reference = getattr(estimator, "heading_reference", "course")
+    if reference not in ("course", "nose"):
+        raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
+    return estimator  # type: ignore[no-any-return]
+
+
+def load_autopilot(spec: str, heading_reference: "HeadingReference" = "course") -> "Autopilot":
+    """A new autopilot by name, ``module:Class`` or ``file.py:Class``; PluginError as for `load_estimator`.
+
+    heading_reference : of the estimator that it will steer on, handed to a class that asks for it by this name
+    """
+    return _load(_AUTOPILOT, spec, heading_reference=heading_reference)  # type: ignore[no-any-return]
+
+
+def _installed(kind: _Kind) -> dict[str, EntryPoint]:
+    return {point.name: point for point in entry_points(group=kind.group) if point.name not in kind.registry}
+
+
+def _offered(kind: _Kind) -> dict[str, str]:
+    return {**kind.registry, **{name: point.value for name, point in _installed(kind).items()}}
+
+
+def _load(kind: _Kind, spec: str, **offered: Any) -> Any:
+    """The object that `spec` names, constructed with those of the `offered` arguments that it asks for, and checked."""
+    what = f"{kind.word} {spec!r}"
+    try:
+        made = _made(_find(kind, spec), offered)
+    except PluginError:
+        raise
+    except Exception as error:  # anything may go wrong in a person's own file: it is their file that is at fault
+        raise PluginError(f"{what}: {_one_line(error)}") from error
+    _check_update(what, kind, made)
+    return made
+
+
+def _made(maker: Any, offered: dict[str, Any]) -> Any:
+    try:
+        asked = set(inspect.signature(maker).parameters)
+    except (TypeError, ValueError):
+        asked = set()  # compiled code that does not tell
+    return maker(**{name: value for name, value in offered.items() if name in asked})
+
+
+def _find(kind: _Kind, spec: str) -> Any:
+    """The class (or whatever is called to make one) that `spec` names."""
+    if spec in kind.registry:
+        spec = kind.registry[spec]
+    elif ":" not in spec:
+        installed = _installed(kind)
+        if spec in installed:
+            return installed[spec].load()
+        hint = near_misses(spec, _offered(kind))
+        raise PluginError(f"unknown {kind.word} {spec!r}: {hint} (one's own: module:Class or file.py:Class)")
+    place, _, name = spec.rpartition(":")
+    module = _module_of_file(Path(place)) if place.endswith(".py") else _module_by_name(kind, place)
+    try:
+        return getattr(module, name)
+    except AttributeError:
+        classes = [n for n, c in vars(module).items() if inspect.isclass(c) and c.__module__ == module.__name__]
+        hint = near_misses(name, classes) if classes else "it defines no class"
+        raise PluginError(f"{kind.word} {spec!r}: no class {name!r} in {place}; {hint}") from None
+
+
+def _module_of_file(path: Path) -> ModuleType:
+    """The module in the file at `path`; its folder can be imported from, after everything installed."""
+    if not path.is_file():
+        raise PluginError(f"no file {str(path)!r}")
+    path = path.resolve()
+    _also_import_from(path.parent)
+    name = f"_wingslevel_file_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise PluginError(f"{str(path)!r} cannot be read as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and pickle look their module up by name
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
+
+
+def _module_by_name(kind: _Kind, name: str) -> ModuleType:
+    """The importable module `name`, also from the working directory."""
+    _also_import_from(Path.cwd())
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name is None or not (name == error.name or name.startswith(f"{error.name}.")):
+            raise  # the module is there; something that it imports is not
+        raise PluginError(
+            f"{kind.word} {name!r}: no such module here or installed (a file is named file.py:Class)"
+        ) from None
+
+
+def _also_import_from(folder: Path) -> None:
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))  # last, so that nothing of ours can be shadowed
+
+
+def _check_update(what: str, kind: _Kind, made: Any) -> None:
+    """Refuse what has no ``update`` of the right number of arguments."""
+    wanted = f"update({', '.join(kind.arguments)})"
+    update = getattr(made, "update", None)
+    if not callable(update):
+        raise PluginError(f"{what}: {type(made).__name__} has no method {wanted}")
+    try:
+        signature = inspect.signature(update)
+    except (TypeError, ValueError):
+        return  # compiled code that does not tell
+    try:
+        signature.bind(*kind.arguments)
+    except TypeError:
+        raise PluginError(f"{what}: {type(made).__name__}.update takes {signature}, must be {wanted}") from None
+
+
+def _one_line(error: BaseException) -> str:
+    """`error` as one line: its kind, its text, and for a syntax error where it is."""
+    return f"{type(error).__name__}: {' '.join(str(error).split()) or 'no message'}"

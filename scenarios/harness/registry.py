@@ -1,0 +1,64 @@
+"""The scenarios there are: every module of the package that exports ``SCENARIO``, and anyone's own file."""
+
+import importlib
+import importlib.util
+import pkgutil
+import sys
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+
+import scenarios
+from scenarios.harness.plugins import near_misses
+from scenarios.harness.scenario import Scenario
+
+
+@cache
+def registered() -> Mapping[str, Scenario]:
+    """All scenarios of the package by name, in order of name."""
+    found = {}
+    for info in sorted(pkgutil.iter_modules(scenarios.__path__), key=lambda info: info.name):
+        if not info.ispkg:
+            scenario = _of(importlib.import_module(f"scenarios.{info.name}"), info.name)
+            found[scenario.name] = scenario
+    return MappingProxyType(found)
+
+
+def find(name: str) -> Scenario:
+    """The scenario called `name`, or the one in a file, ``path/to/file.py``.
+
+    Raises
+    ------
+    ValueError      none of that name (with the near misses), or a file that holds none
+    """
+    if name.endswith(".py"):
+        return _from_file(Path(name))
+    if name not in registered():
+        raise ValueError(f"unknown scenario {name!r}: {near_misses(name, registered())} (one's own: file.py)")
+    return registered()[name]
+
+
+def _from_file(path: Path) -> Scenario:
+    if not path.is_file():
+        raise ValueError(f"scenario: no file {str(path)!r}")
+    module_name = f"_wingslevel_scenario_{path.stem}"
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"scenario: {str(path)!r} cannot be read as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # anything may go wrong in a person's own file: it is their file that is at fault
+        del sys.modules[module_name]
+        text = " ".join(str(error).split())
+        raise ValueError(f"scenario {str(path)!r}: {type(error).__name__}: {text}") from error
+    return _of(module, str(path))
+
+
+def _of(module: ModuleType, where: str) -> Scenario:
+    scenario = getattr(module, "SCENARIO", None)
+    if not isinstance(scenario, Scenario):
+        raise ValueError(f"scenario {where!r}: must export SCENARIO, a Scenario")
+    return scenario

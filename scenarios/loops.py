@@ -1,0 +1,60 @@
+"""Three inside loops, one after the other, flown by a scripted stick.
+
+=============  ===================================================================================================
+Story          Straight and level until everything has settled, a shallow dive for speed, then three loops at a
+               constant pitch rate; the autopilot takes over and levels the wings.
+Verifies       Premerlani & Bizard: the matrix has no singular attitude (Eqn 17, 18-21) and the roll-pitch correction
+               with its centrifugal term (Eqns 25-27) brings it back upright
+Aircraft       endurance
+Wind           3 m/s from any direction, turbulence W20 = 3 m/s
+Sensors        generic
+Passes when    it survives; the nose truly came round three times; from 10 to 30 s after the third loop inclination
+               error at most 5 degrees RMS
+=============  ===================================================================================================
+"""
+
+import math
+
+from autopilot.interface import Mode, Setpoint
+from autopilot.pilot import Script, Timed, inside_loops
+from scenarios.harness.checks import SURVIVED, Check
+from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
+from scenarios.harness.manoeuvres import loops_end_s, most_loops, turns_that_count
+from scenarios.harness.metrics import after, inclination_error_deg, over, rms
+from scenarios.harness.scenario import Scenario
+
+LOOPS = 3
+LOOPED = loops_end_s(LOOPS)
+
+
+def _script(config: FlightConfig) -> Script:
+    m = config.manoeuvre
+    level = Setpoint(Mode.COURSE, course_rad=math.radians(config.heading_deg), height_m=m["height_m"])
+    loops = inside_loops(m["first_s"], LOOPS, level, pitch_rate_rad_s=math.radians(m["pitch_rate_deg_s"]))
+    return Script([Timed(0.0, level), *loops.timed])
+
+
+SCENARIO = Scenario(
+    name="loops",
+    story=__doc__,
+    config=FlightConfig(
+        duration_s=75.0,
+        start=InFlightStart(height_m=100.0),
+        air=AirConfig(wind_m_s=3.0, wind_from_deg="random", turbulence_w20_m_s=3.0),
+        manoeuvre={"height_m": 100.0, "first_s": 25.0, "pitch_rate_deg_s": 110.0},
+    ),
+    script=_script,
+    checks=(
+        SURVIVED,
+        Check("loops flown", "turns", most_loops, turns_that_count(LOOPS), ">="),
+        Check(
+            "inclination error RMS",
+            "deg",
+            over(inclination_error_deg, rms, after(LOOPED, 10.0), after(LOOPED, 30.0)),
+            5.0,
+            pooled="rms",
+            per_flight_limit=7.5,
+        ),
+    ),
+    milestones={"third loop ended": lambda flight: [LOOPED(flight)]},
+)

@@ -1,0 +1,1 @@
+"""A Goldberg-Endurance-class electric model aeroplane."""

@@ -1,0 +1,452 @@
+"""JSBSim behind the Plant protocol: the only place that knows JSBSim, feet and pounds.
+
+A tick is four writes, a few physics steps with no reads between them, and one packed read that a kernel turns
+into the truth row in SI units.  The inertial means of the row come from the change of attitude and velocity
+over the tick (`sim.truth.integrate_imu`).
+"""
+
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from struct import Struct
+from typing import Any
+
+import jsbsim
+import numpy as np
+
+from autopilot.interface import NEUTRAL, ActuatorCommand
+from estimator.interface import Array
+from estimator.jit import kernel
+from sim import hand
+from sim.air import STILL, Air
+from sim.clock import Rates
+from sim.log import Log, Outcome, Phase
+from sim.plant import HandThrow, InFlight, Start
+from sim.rng import stream
+from sim.trim import Trim, trim
+from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
+
+FT_TO_M = 0.3048
+LB_TO_N = 4.4482216152605
+LBFT_TO_NM = LB_TO_N * FT_TO_M
+SLUG_TO_KG = LB_TO_N / FT_TO_M
+SLUGFT2_TO_KGM2 = SLUG_TO_KG * FT_TO_M**2
+
+AIRCRAFT = Path(__file__).parent / "aircraft"
+LATITUDE_DEG, LONGITUDE_DEG = 42.80, -73.95  # the launch point, at sea level
+
+# What is read after each tick: field of the staging record, its JSBSim properties.
+READ: dict[str, tuple[str, ...]] = {
+    "euler_rad": ("attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad"),
+    "omega_b_rad_s": ("velocities/pi-rad_sec", "velocities/qi-rad_sec", "velocities/ri-rad_sec"),
+    "p_neu_ft": ("position/from-start-neu-n-ft", "position/from-start-neu-e-ft", "position/from-start-neu-u-ft"),
+    "v_e_fps": ("velocities/v-north-fps", "velocities/v-east-fps", "velocities/v-down-fps"),
+    "wind_e_fps": tuple(f"atmosphere/total-wind-{d}-fps" for d in ("north", "east", "down")),
+    "surfaces": ("servo/aileron", "servo/elevator", "servo/rudder", "fcs/throttle-pos-norm"),
+    "motor": ("propulsion/engine/propeller-rpm", "propulsion/engine/thrust-lbs"),
+    "contact": ("gear/wow",),
+}
+READ_DTYPE = np.dtype([(name, "f8", (len(properties),)) for name, properties in READ.items()], align=True)
+WRITE = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
+INTEGRATORS = tuple(f"simulation/integrator/{a}" for a in (
+    "rate/rotational", "rate/translational", "position/rotational", "position/translational",
+))  # fmt: skip
+
+STATE_DTYPE = np.dtype(
+    [
+        ("R_eb", "f8", (3, 3)),  # at the end of the previous tick
+        ("v_e_m_s", "f8", (3,)),
+        ("origin_e_m", "f8", (3,)),  # where the start is, from the launch point
+        ("earth_rate_e", "f8", (3,)),
+        ("g_m_s2", "f8"),
+        ("dt_s", "f8"),
+        ("box_radius_m", "f8"),
+        ("box_height_m", "f8"),
+    ],
+    align=True,
+)
+MOVING_PARTS = ("aileron", "elevator", "rudder", "throttle", "rotor_rpm", "thrust_n")  # at rest in the hand
+OUTCOMES = (None, Outcome.GROUND_CONTACT, Outcome.LEFT_BOX, Outcome.DIVERGED)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightBox:
+    """Where the flight may be: a cylinder around the launch point; beyond it the flight is over."""
+
+    radius_m: float = 3000.0
+    height_m: float = 1000.0
+
+
+class _Silent(jsbsim.FGLogger):
+    """JSBSim's console output, dropped."""
+
+    def message(self, _text: str) -> None:
+        return
+
+
+@kernel
+def rotation_of(roll_rad, pitch_rad, yaw_rad, R_eb):  # type: ignore[no-untyped-def]
+    """Write into `R_eb` the body-to-earth rotation of the Euler angles (Etkin & Reid, Eqn 4.4,3, transposed)."""
+    cr, sr = np.cos(roll_rad), np.sin(roll_rad)
+    cp, sp = np.cos(pitch_rad), np.sin(pitch_rad)
+    cy, sy = np.cos(yaw_rad), np.sin(yaw_rad)
+    R_eb[0, 0], R_eb[0, 1], R_eb[0, 2] = cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy
+    R_eb[1, 0], R_eb[1, 1], R_eb[1, 2] = cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy
+    R_eb[2, 0], R_eb[2, 1], R_eb[2, 2] = -sp, sr * cp, cr * cp
+
+
+@kernel
+def complete(truth, k, state):  # type: ignore[no-untyped-def]
+    """Fill what follows from attitude, velocity and wind of row k: inertial means, airspeed, alpha, beta, time."""
+    row, s = truth[k], state[0]
+    integrate_imu(s.R_eb, s.v_e_m_s, row, s.dt_s, s.g_m_s2, s.earth_rate_e)
+    R = row.R_eb
+    v_e, wind_e = row.v_e_m_s, row.wind_e_m_s
+    an, ae, ad = v_e[0] - wind_e[0], v_e[1] - wind_e[1], v_e[2] - wind_e[2]
+    u = R[0, 0] * an + R[1, 0] * ae + R[2, 0] * ad
+    v = R[0, 1] * an + R[1, 1] * ae + R[2, 1] * ad
+    w = R[0, 2] * an + R[1, 2] * ae + R[2, 2] * ad
+    row.t_s = (k + 1) * s.dt_s
+    row.airspeed_m_s = np.sqrt(u * u + v * v + w * w)
+    row.alpha_rad = np.arctan2(w, u)
+    row.beta_rad = np.arctan2(v, np.sqrt(u * u + w * w))
+    for i in range(3):
+        s.v_e_m_s[i] = row.v_e_m_s[i]
+        for j in range(3):
+            s.R_eb[i, j] = R[i, j]
+
+
+@kernel
+def observe(read, truth, k, state):  # type: ignore[no-untyped-def]
+    """Turn what JSBSim reports into truth row k, in SI; return the index of the outcome in OUTCOMES, 0 to fly on."""
+    row, s, r = truth[k], state[0], read[0]
+    rotation_of(r.euler_rad[0], r.euler_rad[1], r.euler_rad[2], row.R_eb)
+    rate2 = speed2 = 0.0
+    for i in range(3):
+        row.omega_b_rad_s[i] = r.omega_b_rad_s[i]
+        row.v_e_m_s[i] = FT_TO_M * r.v_e_fps[i]
+        row.wind_e_m_s[i] = FT_TO_M * r.wind_e_fps[i]
+        row.p_e_m[i] = s.origin_e_m[i] + FT_TO_M * r.p_neu_ft[i] * (1.0 if i < 2 else -1.0)
+        rate2 += row.omega_b_rad_s[i] ** 2
+        speed2 += row.v_e_m_s[i] ** 2
+    row.aileron, row.elevator, row.rudder, row.throttle = r.surfaces[0], r.surfaces[1], r.surfaces[2], r.surfaces[3]
+    row.phase = 2  # flying
+    row.rotor_rpm, row.thrust_n = r.motor[0], LB_TO_N * r.motor[1]
+    complete(truth, k, state)
+    n, e, d = row.p_e_m[0], row.p_e_m[1], row.p_e_m[2]
+    if not (rate2 < 1e4 and speed2 < 4e4 and abs(d) < 1e6 and abs(r.euler_rad[0]) < 10.0):  # NaN fails too
+        return 3
+    if r.contact[0] != 0.0:
+        return 1
+    if n * n + e * e > s.box_radius_m**2 or -d > s.box_height_m:
+        return 2
+    return 0
+
+
+class Model:
+    """One JSBSim aeroplane in SI units: loading, placing, wind; each property name is resolved once."""
+
+    def __init__(self, aircraft: str, physics_hz: int) -> None:
+        self.folder = AIRCRAFT / aircraft
+        known = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
+        if aircraft not in known:
+            raise ValueError(f"unknown aircraft '{aircraft}': choose {', '.join(known)}")
+        self.airframe: dict[str, Any] = tomllib.loads((self.folder / "airframe.toml").read_text())
+        self.dt_s = 1.0 / physics_hz
+        self._logger = _Silent()  # kept alive: JSBSim holds no reference of its own
+        jsbsim.set_logger(self._logger)
+        self.fdm = jsbsim.FGFDMExec(None)
+        self.fdm.set_dt(self.dt_s)  # before the model: the servos' lags are worked out while loading
+        if not self.fdm.load_model_with_paths(aircraft, str(AIRCRAFT), str(self.folder), str(self.folder)):
+            raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")
+        self.run = self.fdm.run
+        self._properties = self.fdm.get_property_manager()
+        self._integrators = [(self.setter(p), self.getter(p)()) for p in INTEGRATORS]
+
+    def _node(self, name: str) -> Any:
+        node = self._properties.get_node(name)
+        if node is None:
+            raise ValueError(f"JSBSim has no property '{name}' in the aircraft '{self.folder.name}'")
+        return node
+
+    def getter(self, name: str) -> Callable[[], float]:
+        """Bound method that reads the property `name`, in JSBSim's unit."""
+        return self._node(name).get_double_value  # type: ignore[no-any-return]
+
+    def setter(self, name: str) -> Callable[[float], None]:
+        """Bound method that writes the property `name`, in JSBSim's unit."""
+        return self._node(name).set_double_value  # type: ignore[no-any-return]
+
+    def get(self, *names: str) -> Array:
+        return np.array([self.getter(name)() for name in names])
+
+    def put(self, values: dict[str, float]) -> None:
+        """Write properties, in JSBSim's units and in the order given."""
+        for name, value in values.items():
+            self.setter(name)(value)
+
+    def mass_kg(self) -> float:
+        return float(self.get("inertia/mass-slugs")[0]) * SLUG_TO_KG
+
+    def inertia_kg_m2(self) -> Array:
+        """Principal moments of inertia, shape (3,)."""
+        return SLUGFT2_TO_KGM2 * self.get(*(f"inertia/i{a}{a}-slugs_ft2" for a in "xyz"))
+
+    def force_and_moment(self) -> tuple[Array, Array]:
+        """All forces but gravity [N] and all moments [N m] on the body in the last step, body axes."""
+        force = LB_TO_N * self.get(*(f"forces/fb{a}-total-lbs" for a in "xyz"))
+        return force, LBFT_TO_NM * self.get(*(f"moments/{a}-total-lbsft" for a in "lmn"))
+
+    def accelerations(self) -> Array:
+        """Rates of change of the body velocity [m/s2] and of the body rates [rad/s2], shape (6,)."""
+        linear = FT_TO_M * self.get(*(f"accelerations/{a}dot-ft_sec2" for a in "uvw"))
+        return np.concatenate([linear, self.get(*(f"accelerations/{a}dot-rad_sec2" for a in "pqr"))])
+
+    def coming_rates(self) -> Array:
+        """Body rates [rad/s] that the next step will reach: what the last one has computed."""
+        rates = self.get(*(f"velocities/{a}-rad_sec" for a in "pqr"))
+        return rates + self.dt_s * self.accelerations()[3:]
+
+    def place(
+        self, height_m: float, euler_rad: tuple[float, float, float], v_b_m_s: Array,
+        omega_b_rad_s: tuple[float, float, float], command: ActuatorCommand, air: Air, settle: int,
+    ) -> None:  # fmt: skip
+        """Start anew above the launch point: velocity over the ground in body axes, servos at `command`, steady wind.
+
+        Then the motion is frozen for `settle` steps (at least 1), in which the propeller finds its speed.
+        """
+        self.put({"ic/lat-geod-deg": LATITUDE_DEG, "ic/long-gc-deg": LONGITUDE_DEG, "ic/terrain-elevation-ft": 0.0})
+        self.put({"ic/h-agl-ft": height_m / FT_TO_M})
+        self.put(dict(zip(("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"), euler_rad, strict=True)))
+        self.put({f"ic/{a}-fps": float(v) / FT_TO_M for a, v in zip("uvw", v_b_m_s, strict=True)})
+        self.put({f"ic/{a}-rad_sec": w for a, w in zip("pqr", omega_b_rad_s, strict=True)})
+        self.put({"atmosphere/turb-type": 0.0})
+        self.push(np.zeros(3), np.zeros(3))
+        self.fdm.run_ic()  # forgets commands and wind
+        self.put(dict(zip(WRITE, command[:4], strict=True)))
+        names = (f"atmosphere/wind-{d}-fps" for d in ("north", "east", "down"))
+        self.put({name: w / FT_TO_M for name, w in zip(names, air.wind_e_m_s, strict=True)})
+        self.fdm.set_trim_status(True)  # servos jump to their commands
+        self.frozen(1)
+        self.fdm.set_trim_status(False)
+        self.frozen(settle - 1)
+
+    def frozen(self, steps: int) -> None:
+        """Run `steps` with the motion held: forces, servos and propeller go on."""
+        for write, _ in self._integrators:
+            write(0.0)
+        for _ in range(steps):
+            self.run()
+        for write, scheme in self._integrators:
+            write(scheme)
+
+    def remember(self, on: bool) -> None:
+        """Off: integrate the velocity without a memory of past accelerations, which would smear a force that jumps."""
+        write, scheme = self._integrators[1]
+        write(scheme if on else 1.0)
+
+    def stir(self, air: Air, seed: int) -> None:
+        """Start the turbulence of `air`: JSBSim's MIL-F-8785C, its own generator, started from `seed`.
+
+        JSBSim 1.3 turns the long-wave axis of winds between the cardinal directions to the wrong side; the
+        strength is right, and along the four directions all is.
+        """
+        if air.turbulence_w20_m_s > 0.0:
+            w20 = "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps"
+            self.put({"atmosphere/turb-type": 3.0, w20: air.turbulence_w20_m_s / FT_TO_M})
+            self.put({"atmosphere/turbulence/milspec/severity": 3.0, "atmosphere/randomseed": float(seed)})
+
+    def push(self, force_b_n: Array, moment_b_nm: Array) -> None:
+        """Set the force and the moment of the hand, body axes; they stay until set again."""
+        hand_force, moment = "external_reactions/hand", "external_reactions/hand_moment"
+        self.put({f"{hand_force}/{a}": float(f) / LB_TO_N for a, f in zip("xyz", force_b_n, strict=True)})
+        self.put({f"{moment}/{a}": float(m) / LBFT_TO_NM for a, m in zip("lmn", moment_b_nm, strict=True)})
+        self.put({f"{hand_force}/magnitude": 1.0, f"{moment}/magnitude-lbsft": 1.0})
+
+
+class JsbsimPlant:
+    """An aeroplane flown by JSBSim.
+
+    Parameters
+    ----------
+    aircraft : name of a folder of `sim/aircraft`
+    start : in the air or thrown by hand
+    air : wind and turbulence
+    rates : physics and inertial rates
+    seed, flight : which random streams (the turbulence is the only one here)
+    box : where the flight may be
+
+    Raises ValueError for an unknown aircraft or a start that cannot be.
+    """
+
+    latitude_deg, longitude_deg = LATITUDE_DEG, LONGITUDE_DEG
+
+    def __init__(
+        self, aircraft: str = "endurance", *, start: Start, air: Air = STILL, rates: Rates | None = None,
+        seed: int = 0, flight: int = 0, box: FlightBox | None = None,
+    ) -> None:  # fmt: skip
+        rates = rates or Rates()
+        box = box or FlightBox()
+        self.model = Model(aircraft, rates.physics_hz)
+        self.airframe = self.model.airframe
+        self.start, self.air = start, air
+        self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
+        # JSBSim keeps the seed in a 32-bit signed integer.
+        self._turbulence_seed = int(stream(seed, flight, "turbulence").integers(1, 2**31 - 1))
+        self._hold_ticks = self._release_tick = self._hand_ticks = 0
+        if isinstance(start, HandThrow):
+            hand.check(start)
+            self._hold_ticks = rates.ticks(start.hold_s)
+            self._release_tick = self._hold_ticks + max(1, rates.ticks(start.push_s))
+            self._hand_ticks = self._release_tick + 1  # the first tick of the flight puts its integrator away
+        self.release_s = self._release_tick * self.dt_s
+        self._read = np.zeros(1, READ_DTYPE)
+        self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
+        self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._pack = Struct(f"{len(self._getters)}d").pack_into
+        self._buffer = self._read.data
+        self._state = np.zeros(1, STATE_DTYPE)
+        latitude_rad = math.radians(LATITUDE_DEG)
+        s = self._state[0]
+        s["earth_rate_e"], s["g_m_s2"] = earth_rate_e_rad_s(latitude_rad), gravity_m_s2(latitude_rad)
+        s["dt_s"], s["box_radius_m"], s["box_height_m"] = self.dt_s, box.radius_m, box.height_m
+        self._trim = Trim.of(self.airframe["cruise"])
+        if isinstance(start, InFlight) and start.airspeed_m_s not in (None, self._trim.airspeed_m_s):
+            self._trim = trim(self.model, start.airspeed_m_s, start.height_m)
+
+    def reset(self, log: Log) -> None:
+        """Put the aeroplane at its start; the rows of `log` are filled from tick 0 on."""
+        self._truth = log.truth
+        s = self._state[0]
+        if isinstance(self.start, HandThrow):
+            rotation_of(*hand.sway(self.start, 0.0)[0], s["R_eb"])
+            s["v_e_m_s"] = 0.0
+        else:
+            self._start_in_flight(self.start)
+
+    def _start_in_flight(self, start: InFlight) -> None:
+        """Trimmed, level relative to the moving air, heading as asked; servos and propeller as in the trim."""
+        t = self._trim
+        euler_rad = (0.0, t.alpha_rad, start.heading_rad)
+        R_eb = np.empty((3, 3))
+        rotation_of(*euler_rad, R_eb)
+        through_air_b = t.airspeed_m_s * np.array([math.cos(t.alpha_rad), 0.0, math.sin(t.alpha_rad)])
+        v_b = through_air_b + R_eb.T @ np.array(self.air.wind_e_m_s)
+        self.begin((start.north_m, start.east_m, -start.height_m), euler_rad, v_b, command=t.command)
+
+    def begin(
+        self, p_e_m: tuple[float, float, float], euler_rad: tuple[float, float, float], v_b_m_s: Array,
+        omega_b_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0), command: ActuatorCommand = NEUTRAL,
+        settle_s: float = 1.0,
+    ) -> None:  # fmt: skip
+        """Put the aeroplane into any state, to fly on from there.
+
+        p_e_m : (north, east, down) from the launch point       euler_rad : roll, pitch, yaw
+        v_b_m_s : (3,) velocity over the ground, body axes      omega_b_rad_s : body rates against the earth
+        command : where the servos are                          settle_s : time for the propeller to find its speed
+        """
+        s = self._state[0]
+        rotation_of(*euler_rad, s["R_eb"])
+        s["v_e_m_s"] = s["R_eb"] @ v_b_m_s
+        settle = max(1, round(settle_s / self.model.dt_s))
+        self.model.place(-p_e_m[2], euler_rad, v_b_m_s, omega_b_rad_s, command, self.air, settle)
+        n, e, u = FT_TO_M * self.model.get(*READ["p_neu_ft"])
+        s["origin_e_m"] = np.array(p_e_m) - np.array([n, e, -u])
+        self.model.stir(self.air, self._turbulence_seed)
+
+    def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
+        """Fly tick `k` under `command` and fill truth row k; an Outcome where the flight ended in it."""
+        if k < self._hand_ticks:
+            return self._in_hand(k, command)
+        self._command(command)
+        run = self.model.run
+        for _ in range(self.steps):
+            run()
+        return self._observe(k)
+
+    def _command(self, command: ActuatorCommand) -> None:
+        self._aileron(command[0])
+        self._elevator(command[1])
+        self._rudder(command[2])
+        self._throttle(command[3])
+
+    def _observe(self, k: int) -> Outcome | None:
+        self._pack(self._buffer, 0, *[read() for read in self._getters])
+        return OUTCOMES[observe(self._read, self._truth, k, self._state)]
+
+    def run_bare(self, n_ticks: int) -> None:
+        """The physics of `n_ticks` and nothing else, commands as they are: what a benchmark compares with."""
+        run = self.model.run
+        for _ in range(n_ticks * self.steps):
+            run()
+
+    def _in_hand(self, k: int, command: ActuatorCommand) -> Outcome | None:
+        """Tick k of a throw, up to and with the first tick of the flight."""
+        start = self.start
+        if not isinstance(start, HandThrow):
+            raise TypeError("only a thrown aeroplane is ever in the hand")
+        if k < self._hold_ticks:
+            self._hold(start, k)
+            return None
+        if k == self._hold_ticks:
+            self._begin_push(start)
+        self._command(command)
+        first = (k - self._hold_ticks) * self.steps
+        last = (self._release_tick - self._hold_ticks) * self.steps
+        for step in range(first + 1, first + self.steps + 1):
+            # What is set before a run acts in the next one: nothing may be left for the first step of the flight.
+            if step < last:
+                self._push(start, (step + 1) / last)
+            elif step == last:
+                self._set_hand(np.zeros(3), np.zeros(3))
+            self.model.run()
+        outcome = self._observe(k)
+        if k < self._release_tick:
+            self._truth[k]["phase"] = Phase.THROWN
+        else:
+            self.model.remember(True)
+        return outcome
+
+    def _hold(self, start: HandThrow, k: int) -> None:
+        """Truth row k in the hand: at rest at the launch point but for the sway."""
+        euler_rad, rates = hand.sway(start, (k + 1) * self.dt_s)
+        row = self._truth[k]
+        for name in MOVING_PARTS:
+            row[name] = 0.0
+        rotation_of(*euler_rad, row["R_eb"])
+        row["omega_b_rad_s"] = np.array(rates) + row["R_eb"].T @ self._state[0]["earth_rate_e"]
+        row["p_e_m"] = (0.0, 0.0, -start.height_m)
+        row["v_e_m_s"] = 0.0
+        row["wind_e_m_s"] = self.air.wind_e_m_s
+        row["phase"] = Phase.HELD
+        complete(self._truth, k, self._state)
+
+    def _begin_push(self, start: HandThrow) -> None:
+        """JSBSim takes over where the closed form ends, the hand already pushing."""
+        euler_rad, rates = hand.sway(start, self._hold_ticks * self.dt_s)
+        self._rates_at_push = np.array(rates)
+        self.begin((0.0, 0.0, -start.height_m), euler_rad, np.zeros(3), rates, settle_s=0.0)
+        self._set_hand(np.zeros(3), np.zeros(3))
+        self._push(start, 1.0 / ((self._release_tick - self._hold_ticks) * self.steps))
+        self.model.frozen(1)
+        self.model.remember(False)
+
+    def _push(self, start: HandThrow, part: float) -> None:
+        """Set the hand's force and moment so that the rates are right when `part` (0..1) of the push is over."""
+        force, moment = self.model.force_and_moment()
+        others = force - self._hand[0], moment - self._hand[1]
+        wanted = (1.0 - part) * self._rates_at_push + part * np.array(start.release_rate_b_rad_s)
+        R_eb = np.empty((3, 3))
+        rotation_of(*self.model.get(*READ["euler_rad"]), R_eb)
+        self._set_hand(
+            *hand.guide(
+                R_eb, self.model.coming_rates(), wanted, others, start.push_m_s2,
+                float(self._state[0]["g_m_s2"]), self.model.mass_kg(), self.model.inertia_kg_m2(), self.model.dt_s,
+            )
+        )  # fmt: skip
+
+    def _set_hand(self, force_b_n: Array, moment_b_nm: Array) -> None:
+        self._hand = force_b_n, moment_b_nm
+        self.model.push(force_b_n, moment_b_nm)

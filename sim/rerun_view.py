@@ -1,0 +1,455 @@
+"""A flight to look at: the Rerun recording of truth beside estimate, and the viewer that shows it.
+
+`write` makes a ``.rrd`` in bulk after the flight, with the layout of the viewer inside; `LiveView` streams the same
+in blocks while flying; `open_viewer` shows a file.  Times are seconds since the release, negative before it.  No
+wall clock goes into a recording: the same flight gives the same data.
+
+The estimated aeroplane is drawn at the true position, so that what one sees between the two is attitude error
+alone.  The chase view follows the path, not the nose: its horizon stays level, and bank and pitch are seen.
+"""
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pymap3d
+from scipy.spatial.transform import Rotation
+
+from autopilot.interface import Mode
+from estimator.interface import Array, HeadingReference, Health
+from estimator.rotation import from_euler
+from sim.log import Event, Flight, Log, Phase
+from sim.mesh import Mesh, aeroplane, geometry_of
+from sim.plots import DEMAND, ESTIMATE, PAGES, PLOTS, TRUTH, Colour, curves
+from sim.recording import RecordingError, digest, replacing
+
+if TYPE_CHECKING:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+TIMELINE = "sim_time"
+LAUNCH_LATITUDE_DEG, LAUNCH_LONGITUDE_DEG = 42.80, -73.95  # where the manifest names no other place
+
+_SKY: Colour = (30, 38, 50)
+_GROUND: Colour = (40, 50, 46)
+_GRID: Colour = (78, 94, 88)
+_WIND: Colour = (120, 220, 230)
+_LARGE = 14.0  # the overview shows the aeroplane so many times too large, or nobody would find it
+_TRACK_HZ = 10.0  # the drawn tracks
+_CHASE_S = 1.5  # the chase view follows the path smoothed over about so long
+_LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
+
+
+def write(flight: Flight, path: str | Path) -> Path:
+    """Write the Rerun recording of `flight` to `path`, complete or not at all, and return it.
+
+    Raises
+    ------
+    RecordingError    where the system refuses to write
+    """
+    path = Path(path)
+    scene = Scene.of(flight.manifest, flight.release_s, flight.heading_reference)
+    with replacing(path) as temporary:
+        temporary.touch()  # a refusal is ours to word, not Rerun's
+        rec = _stream(flight.manifest, digest(flight)[:16])
+        rec.save(temporary, default_blueprint=_blueprint(flight.log, flight.release_s))
+        _send_fixed(rec, scene)
+        _send_rows(rec, scene, flight.log, 0)
+        _send_end(rec, flight)
+        rec.disconnect()
+    return path
+
+
+class LiveView:
+    """Streams a flight to a viewer while it is flown: call it with the log and the number of rows filled so far.
+
+    url : of the viewer's gRPC server, see `Viewer`     manifest, release_s, heading_reference : as of the `Flight`
+    """
+
+    def __init__(
+        self, url: str, manifest: Mapping[str, Any], release_s: float, heading_reference: HeadingReference
+    ) -> None:
+        self._scene = Scene.of(manifest, release_s, heading_reference)
+        self._sent = 0
+        self._rec = _stream(manifest, None)
+        self._rec.connect_grpc(url, default_blueprint=_blueprint(None, 0.0))
+        _send_fixed(self._rec, self._scene)
+
+    def __call__(self, log: Log, n_rows: int) -> None:
+        """Send the rows that are new."""
+        _send_rows(self._rec, self._scene, log.until(n_rows), self._sent)
+        self._sent = n_rows
+
+    def close(self, flight: Flight) -> None:
+        """Send what is left of `flight`, its events and its story."""
+        self(flight.log, len(flight.log))
+        _send_end(self._rec, flight)
+        self._rec.flush()
+        self._rec.disconnect()
+
+
+@dataclass(frozen=True, slots=True)
+class Viewer:
+    """A viewer process that was started.
+
+    process : of the viewer, which outlives us     url : its gRPC server, for `LiveView`
+    address : to be opened in a browser; None where a window opened by itself
+    """
+
+    process: subprocess.Popen[bytes]
+    url: str
+    address: str | None
+
+
+def open_viewer(path: str | Path | None = None, *, web: bool = False) -> Viewer:
+    """Start Rerun's viewer on the recording at `path`, or empty for a live flight; on the loopback address only.
+
+    web : serve it to a browser instead of opening a window, as one must where there is no display
+
+    Raises
+    ------
+    RecordingError    no file there, no display to open a window on, or a viewer that does not start
+    """
+    if path is not None and not Path(path).is_file():
+        raise RecordingError(f"no Rerun recording at {path}: there is no such file")
+    if not web and not _has_display():
+        raise RecordingError("no display here to open a window on: add --web to serve the recording to a browser")
+    grpc_port, web_port = _free_port(), _free_port()
+    url = f"rerun+http://127.0.0.1:{grpc_port}/proxy"
+    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(grpc_port)]
+    command += ["--serve-web", "--web-viewer-port", str(web_port)] if web else ["--expect-data-soon"]
+    command += [] if path is None else [str(path)]
+    process = subprocess.Popen(
+        command,
+        env={**os.environ, "RERUN_ANALYTICS": "0"},
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )  # fmt: skip
+    _await_port(process, grpc_port)
+    address = f"http://127.0.0.1:{web_port}/?url={url.replace('+', '%2B')}" if web else None
+    return Viewer(process, url, address)
+
+
+def _has_display() -> bool:
+    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _free_port() -> int:
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return int(s.getsockname()[1])
+
+
+def _await_port(process: subprocess.Popen[bytes], port: int, within_s: float = 20.0) -> None:
+    end = time.monotonic() + within_s
+    while time.monotonic() < end:
+        if process.poll() is not None:
+            raise RecordingError(f"the Rerun viewer did not start: it ended with code {process.returncode}")
+        with socket.socket() as s:
+            s.settimeout(0.5)
+            if s.connect_ex(("127.0.0.1", port)) == 0:
+                return
+        time.sleep(0.05)
+    process.terminate()
+    raise RecordingError(f"the Rerun viewer did not start: nothing listens on 127.0.0.1:{port} after {within_s:g} s")
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What is drawn and where, beside the rows of the log.
+
+    parts : the aeroplane     place : latitude and longitude of the launch point, degrees
+    """
+
+    parts: dict[str, Mesh]
+    place: tuple[float, float]
+    release_s: float
+    heading_reference: HeadingReference
+
+    @classmethod
+    def of(cls, manifest: Mapping[str, Any], release_s: float, heading_reference: HeadingReference) -> "Scene":
+        """The scene of a flight with `manifest`; an aeroplane without a geometry is drawn as the `endurance`."""
+        try:
+            geometry = geometry_of(str(setting(manifest, "aircraft", "endurance")))
+        except ValueError:
+            geometry = geometry_of("endurance")
+        place = (
+            float(setting(manifest, "launch_latitude_deg", LAUNCH_LATITUDE_DEG)),
+            float(setting(manifest, "launch_longitude_deg", LAUNCH_LONGITUDE_DEG)),
+        )
+        return cls(aeroplane(geometry), place, release_s, heading_reference)
+
+    def lat_lon_deg(self, p_e_m: Array) -> Array:
+        """Latitude and longitude, shape (n, 2), of positions from the launch point, shape (n, 3) (WGS 84)."""
+        latitude, longitude, _ = pymap3d.ned2geodetic(*p_e_m.T, *self.place, 0.0)
+        return np.column_stack((latitude, longitude))
+
+
+def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> Any:
+    """Entry `name` of the manifest, or of the resolved configuration in it."""
+    value = manifest.get(name, (manifest.get("configuration") or {}).get(name))
+    return otherwise if value is None else value
+
+
+def _stream(manifest: Mapping[str, Any], recording_id: str | None) -> "rr.RecordingStream":
+    import rerun as rr
+
+    rec = rr.RecordingStream("wingslevel", recording_id=recording_id, send_properties=False)
+    rec.set_log_time_enabled(False)
+    scenario, estimator = setting(manifest, "scenario", "flight"), setting(manifest, "estimator", "estimator")
+    rec.send_recording_name(f"{scenario}, {estimator}, seed {setting(manifest, 'seed', 0)}")
+    return rec
+
+
+def _send_fixed(rec: "rr.RecordingStream", scene: Scene) -> None:
+    """What never moves: ground, launch point, the shapes of the aeroplanes, the names and colours of the lines."""
+    import rerun as rr
+
+    rec.log("world", rr.ViewCoordinates.FRD, static=True)  # north, east, down
+    far = 4000.0
+    steps = np.arange(-1000.0, 1001.0, 50.0)  # short segments: a long one is drawn as thick as its far end needs
+    along = [np.column_stack((steps, np.full_like(steps, s), np.zeros_like(steps))) for s in steps]
+    across = [strip[:, [1, 0, 2]] for strip in along]
+    grid = rr.LineStrips3D(along + across, colors=_GRID, radii=rr.Radius.ui_points(0.5))
+    rec.log("world/ground/grid", grid, static=True)
+    corners = np.array([[-far, -far, 0.5], [far, -far, 0.5], [far, far, 0.5], [-far, far, 0.5]])
+    plain = rr.Mesh3D(
+        vertex_positions=corners, triangle_indices=[[0, 2, 1], [0, 3, 2]],
+        vertex_normals=np.tile([0.0, 0.0, -1.0], (4, 1)), albedo_factor=_GROUND,
+    )  # fmt: skip
+    rec.log("world/ground/plain", plain, static=True)
+    launch = rr.Points3D([[0.0, 0.0, 0.0]], radii=rr.Radius.ui_points(5.0), colors=(255, 255, 255), labels="launch")
+    rec.log("world/launch", launch, static=True)
+    home = rr.GeoPoints(lat_lon=[scene.place], radii=rr.Radius.ui_points(5.0), colors=(255, 255, 255))
+    rec.log("map/launch", home, static=True)
+    for name, mesh in scene.parts.items():
+        for body, colour, alpha in (("truth", TRUTH, 255), ("estimate", ESTIMATE, 110)):
+            shape = _painted(mesh, name, colour, alpha)
+            rec.log(f"world/{body}/body/{name}", shape, static=True)
+        rec.log(f"world/truth/body/large/{name}", _painted(mesh, name, TRUTH, 255), static=True)
+    rec.log("world/truth/body/large", rr.Transform3D(scale=_LARGE), static=True)
+    for plot in PLOTS:
+        lines = rr.SeriesLines(
+            names=[c.name for c in plot.curves], colors=[c.colour for c in plot.curves],
+            widths=[1.0 if c.colour == DEMAND else 1.6 for c in plot.curves],
+        )  # fmt: skip
+        rec.log(f"plots/{plot.path}", lines, static=True)
+
+
+def _painted(mesh: Mesh, name: str, colour: Colour, alpha: int) -> "rr.Mesh3D":
+    """The mesh in its colour: dark below, so that one sees which side is up; fuselage pale, propeller thin air."""
+    import rerun as rr
+
+    base = np.array(colour, np.float64)
+    if name == "propeller":
+        base, alpha = np.array([220.0, 220.0, 220.0]), alpha // 4
+    elif name == "fuselage":
+        base = 0.35 * base + 0.65 * 235.0
+    below = np.clip(mesh.normals[:, 2:], 0.0, 1.0) if name != "propeller" else 0.0
+    rgb = base * (1.0 - 0.65 * below)
+    rgba = np.column_stack((np.broadcast_to(rgb, mesh.vertices.shape), np.full(len(mesh.vertices), alpha)))
+    return rr.Mesh3D(
+        vertex_positions=mesh.vertices, triangle_indices=mesh.triangles, vertex_normals=mesh.normals,
+        vertex_colors=rgba.astype(np.uint8), albedo_factor=(255, 255, 255, alpha),
+    )  # fmt: skip
+
+
+def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int) -> None:
+    """The rows of `log` from `start` on; the tracks anew as a whole."""
+    import rerun as rr
+
+    if start >= len(log):
+        return
+    t_s = log.truth["t_s"] - scene.release_s
+    new = slice(start, None)
+    p_e_m = log.truth["p_e_m"]
+
+    def when(rows: Any) -> list[rr.TimeColumn]:
+        return [rr.TimeColumn(TIMELINE, duration=t_s[rows])]
+
+    poses = {
+        "world/truth/body": log.truth["R_eb"],
+        "world/estimate/body": log.flown["R_eb"],
+        "world/chase": _path_frame(log),
+    }
+    for path, R_eb in poses.items():
+        quaternion = Rotation.from_matrix(R_eb[new]).as_quat()
+        rec.send_columns(path, when(new), rr.Transform3D.columns(translation=p_e_m[new], quaternion=quaternion))
+    for path, lines in curves(log, scene.heading_reference).items():
+        values = lines[new]
+        columns = rr.Scalars.columns(scalars=values.ravel()).partition([values.shape[1]] * len(values))
+        rec.send_columns(f"plots/{path}", when(new), columns)
+    for lane, (table, column, meaning) in _LANES.items():
+        states = getattr(log, table)[column]
+        changed = np.flatnonzero(np.diff(states, prepend=-1))
+        changed = changed[changed >= start]
+        if len(changed):
+            words = [meaning(states[k]).name.lower() for k in changed]
+            rec.send_columns(f"states/{lane}", when(changed), rr.StateChange.columns(state=words))
+    here = scene.lat_lon_deg(p_e_m)
+    size = rr.Radius.ui_points(7.0)
+    rec.log("map/aeroplane", rr.GeoPoints.from_fields(colors=TRUTH, radii=size), static=True)
+    rec.send_columns("map/aeroplane", when(new), rr.GeoPoints.columns(positions=here[new]))
+    _send_tracks(rec, scene, log, here)
+
+
+def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array) -> None:
+    """The way so far: truth, its shadow on the ground, the GPS fixes; and the mean wind at the launch point."""
+    import rerun as rr
+
+    every = max(1, round(1.0 / (_TRACK_HZ * max(float(log.measured["dt_s"][-1]), 1e-3))))
+    track = log.truth["p_e_m"][::every]
+    thin = rr.Radius.ui_points(1.0)
+    rec.log("world/truth/track", rr.LineStrips3D([track], colors=TRUTH, radii=rr.Radius.ui_points(1.5)), static=True)
+    shadow = track * [1.0, 1.0, 0.0]
+    rec.log("world/truth/shadow", rr.LineStrips3D([shadow], colors=(0, 0, 0, 120), radii=thin), static=True)
+    on_map = rr.GeoLineStrings(lat_lon=[here[::every]], colors=TRUTH, radii=rr.Radius.ui_points(2.0))
+    rec.log("map/truth", on_map, static=True)
+    fixes = log.measured["gps_p_e_m"][log.measured["gps_new"] > 0]
+    if len(fixes):
+        rec.log("world/gps", rr.Points3D(fixes, colors=ESTIMATE, radii=rr.Radius.ui_points(1.5)), static=True)
+        reported = rr.GeoPoints(lat_lon=scene.lat_lon_deg(fixes), colors=ESTIMATE, radii=rr.Radius.ui_points(1.5))
+        rec.log("map/gps", reported, static=True)
+    wind_e_m_s = log.truth["wind_e_m_s"].mean(axis=0)
+    speed_m_s = float(np.hypot(wind_e_m_s[0], wind_e_m_s[1]))
+    if speed_m_s > 0.1:
+        from_deg = float(np.degrees(np.arctan2(-wind_e_m_s[1], -wind_e_m_s[0])) % 360.0)
+        arrow = rr.Arrows3D(
+            vectors=[wind_e_m_s * 8.0], origins=[wind_e_m_s * -10.0], colors=_WIND, radii=1.0,
+            labels=f"wind {speed_m_s:.1f} m/s from {from_deg:.0f}°",
+        )  # fmt: skip
+        rec.log("world/wind", arrow, static=True)
+
+
+def _path_frame(log: Log) -> Array:
+    """Level frames along the smoothed path, shape (n, 3, 3); where there is no path, along the nose."""
+    v_e_m_s, nose = log.truth["v_e_m_s"], log.truth["R_eb"][:, :, 0]
+    ahead = v_e_m_s[:, 0] + 0.3 * nose[:, 0] + 1j * (v_e_m_s[:, 1] + 0.3 * nose[:, 1])
+    half = max(1, round(_CHASE_S / max(float(log.measured["dt_s"][-1]), 1e-3)))
+    window = np.hanning(2 * half + 1)
+    padded = np.concatenate((np.full(half, ahead[0]), ahead, np.full(half, ahead[-1])))
+    smooth = np.convolve(padded, window / window.sum(), mode="valid")
+    return from_euler(0.0, 0.0, np.angle(smooth))
+
+
+def _send_end(rec: "rr.RecordingStream", flight: Flight) -> None:
+    """What is known when the flight has ended: its events and its story."""
+    import rerun as rr
+
+    events: Sequence[Event] = flight.events
+    if events:
+        when = [rr.TimeColumn(TIMELINE, duration=[e.t_s - flight.release_s for e in events])]
+        columns = rr.TextLog.columns(text=[e.text for e in events], level=[e.level.upper() for e in events])
+        rec.send_columns("events", when, columns)
+    rec.log("story", rr.TextDocument(story(flight), media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def story(flight: Flight) -> str:
+    """What was flown and how it went, as Markdown."""
+    told = {name: setting(flight.manifest, name) for name in ("aircraft", "estimator", "autopilot", "seed", "wind")}
+    end_s = float(flight.log.truth["t_s"][-1]) - flight.release_s if len(flight.log) else 0.0
+    told["heading is judged against"] = f"the true {flight.heading_reference}"
+    how = flight.outcome.replace("_", " ") + (f": {flight.message}" if flight.message else "")
+    told["outcome"] = f"{how}, {end_s:.1f} s after the release"
+    lines = [f"# {setting(flight.manifest, 'scenario', 'Flight')}", ""]
+    lines += [f"- {name}: **{value}**" for name, value in told.items() if value is not None]
+    verdict = flight.manifest.get("verdict") or ()
+    if verdict:
+        lines += ["", "## Verdict", "", "| check | measured | limit | |", "|-|-:|-:|-|"]
+        for row in verdict:
+            measured, limit = (_figure(row.get(key), row.get("unit", "")) for key in ("measured", "limit"))
+            lines.append(f"| {row['check']} | {measured} | {limit} | {'passed' if row['passed'] else '**FAILED**'} |")
+    lines += ["", "Orange is the truth, blue the estimate, green a sensor, grey a demand."]
+    return "\n".join(lines)
+
+
+def _figure(value: Any, unit: str) -> str:
+    return f"{value:.3g} {unit}".strip() if isinstance(value, int | float) else "none"
+
+
+def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
+    """The layout: chase view, overview and map on the left; plots, story and events on the right.
+
+    log : what the overview shall hold; None for a flight that is still to come
+    """
+    import rerun.blueprint as rrb
+
+    up = (0.0, 0.0, -1.0)
+    sky = rrb.Background(color=_SKY)
+    chase = rrb.Spatial3DView(
+        origin="/world/chase", contents=["+ /world/**", "- /world/truth/body/large/**", "- /world/launch", "- /world/gps"],
+        name="Chase: orange truth, blue estimate", background=sky, line_grid=False,
+        eye_controls=rrb.EyeControls3D(position=(-2.3, -0.9, -1.25), look_target=(0.0, 0.0, 0.0), eye_up=up),
+    )  # fmt: skip
+    centre, reach = _extent(log)
+    overview = rrb.Spatial3DView(
+        origin="/world", contents=["+ /world/**", "- /world/estimate/body/**"],
+        name="The whole flight", background=sky, line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            position=centre + reach * np.array([-0.55, -0.2, -0.45]), look_target=centre, eye_up=up
+        ),
+    )  # fmt: skip
+    degrees_wide = 1.6 * reach / 111_320.0
+    on_map = rrb.MapView(origin="/map", name="Map", zoom=float(np.log2(360.0 / degrees_wide) + 0.3))
+    axis = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal, view_range=_span(log, release_s))
+    pages = [
+        rrb.Vertical(
+            *(
+                rrb.TimeSeriesView(
+                    origin=f"/plots/{plot.path}", name=plot.title, axis_x=axis,
+                    plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0 or plot.curves != plots[k - 1].curves),
+                )
+                for k, plot in enumerate(plots)
+            ),
+            name=page,
+        )
+        for page, plots in PAGES.items()
+    ]  # fmt: skip
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(chase, rrb.Horizontal(overview, on_map, column_shares=[3, 2]), row_shares=[3, 2]),
+            rrb.Vertical(
+                rrb.Tabs(*pages, active_tab=0),
+                rrb.StateTimelineView(origin="/states", name="Phase, mode, estimator", time_view=axis),
+                rrb.Tabs(
+                    rrb.TextDocumentView(origin="/story", name="Story"),
+                    rrb.TextLogView(origin="/events", name="Events"),
+                    active_tab=0,
+                ),
+                row_shares=[7.2, 2.2, 2.6],
+            ),
+            column_shares=[9, 8],
+        ),
+        rrb.TimePanel(state="collapsed", timeline=TIMELINE, playback_speed=1.0),
+        rrb.TopPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _extent(log: Log | None) -> tuple[Array, float]:
+    """Centre of the flown volume, shape (3,), and its reach in metres."""
+    if log is None or len(log) == 0:
+        return np.array([0.0, 0.0, -30.0]), 150.0
+    corners = np.array([log.truth["p_e_m"].min(axis=0), log.truth["p_e_m"].max(axis=0), np.zeros(3)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return 0.5 * (low + high), max(60.0, float(np.linalg.norm(high - low)))
+
+
+def _span(log: Log | None, release_s: float) -> "rrb.TimeRange | None":
+    """The time that the plots show at first: all of it."""
+    import rerun.blueprint as rrb
+
+    if log is None or len(log) == 0:
+        return None
+    ends = (rrb.TimeRangeBoundary.absolute(seconds=float(t_s) - release_s) for t_s in log.truth["t_s"][[0, -1]])
+    return rrb.TimeRange(*ends)

@@ -1,0 +1,88 @@
+"""Rate gyro: turn-on bias, drift, random walk, noise, gain and cross-axis errors, saturation, quantisation.
+
+reading = convert(M omega + bias(t) + noise),   M = 1 + diag(gain) + cross-axis,
+bias(t) = turn-on + drift t + random walk
+
+`omega` is the mean inertial rate over the tick.  The additive part bias(t) is what an estimator can learn as
+a bias; it is kept in the truth.  Terms as in IEEE Std 952 (rate ramp, rate random walk, angle random walk).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.jit import kernel
+from sim.clock import Rates
+from sim.sensors.noise import Source, convert, random_walk, require, require_converter, sample_sigma, step_of
+
+
+@dataclass(frozen=True, slots=True)
+class GyroParams:
+    """Errors of a three-axis rate gyro; each sigma is over flights and axes.
+
+    The defaults are a cheap analogue MEMS part.
+
+    bias_deg_s : sigma of the bias at turn-on, constant in a flight
+    drift_deg_s_min : sigma of the steady change of that bias, as in warming up, deg/s per minute
+    walk_deg_s_sqrt_s : the bias walks at random, sigma after one second, deg/s per root second
+    noise_deg_s : sigma of the white noise of a sample at 50 Hz; grows with the root of the rate
+    gain : sigma of the relative gain error        cross_axis : sigma of each axis' sensitivity to another
+    range_deg_s : full scale, readings clip at it  bits : of the converter over +-range; 0 is not quantised
+    """
+
+    bias_deg_s: float = 1.0
+    drift_deg_s_min: float = 0.2
+    walk_deg_s_sqrt_s: float = 0.01
+    noise_deg_s: float = 0.3
+    gain: float = 0.015
+    cross_axis: float = 0.005
+    range_deg_s: float = 300.0
+    bits: int = 10
+
+    def __post_init__(self) -> None:
+        require(self, "deg/s", "bias_deg_s", "noise_deg_s")
+        require(self, "deg/s/min", "drift_deg_s_min")
+        require(self, "deg/s/sqrt(s)", "walk_deg_s_sqrt_s")
+        require(self, "(a fraction)", "gain", "cross_axis")
+        require_converter(self, "deg/s", "range_deg_s")
+
+
+UNIT = np.dtype([("M", "f8", (3, 3)), ("step_rad_s", "f8"), ("range_rad_s", "f8")], align=True)
+NOISE = (("gyro_bias_b_rad_s", "f8", (3,)), ("gyro_noise_b_rad_s", "f8", (3,)))
+
+
+def make(params: GyroParams, source: Source, unit: NDArray[np.void]) -> None:
+    """Make one gyro: draw the errors that stay for life into `unit`, shape (1,) of UNIT."""
+    M = np.diag(1.0 + params.gain * source("gyro gain").standard_normal(3))
+    off_diagonal = ~np.eye(3, dtype=bool)
+    M[off_diagonal] = params.cross_axis * source("gyro cross-axis").standard_normal(6)
+    unit["M"] = M
+    unit["range_rad_s"] = math.radians(params.range_deg_s)
+    unit["step_rad_s"] = step_of(math.radians(params.range_deg_s), params.bits)
+
+
+def draw(params: GyroParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
+    """Draw bias and noise of every tick of a flight into the columns NOISE of `noise`, shape (n,)."""
+    n, dt_s = len(noise), rates.dt_s
+    t_s = np.arange(1, n + 1)[:, None] * dt_s
+    turn_on = params.bias_deg_s * source("gyro bias").standard_normal(3)
+    drift = params.drift_deg_s_min / 60.0 * source("gyro drift").standard_normal(3)
+    walk = random_walk(source("gyro walk").standard_normal((n, 3)), params.walk_deg_s_sqrt_s, dt_s)
+    white = source("gyro noise").standard_normal((n, 3))
+    noise["gyro_bias_b_rad_s"] = np.radians(turn_on + drift * t_s + walk)
+    noise["gyro_noise_b_rad_s"] = np.radians(sample_sigma(params.noise_deg_s, rates.imu_hz)) * white
+
+
+@kernel
+def measure_rate(truth, measured, noise, k, unit):  # type: ignore[no-untyped-def]
+    """Fill the gyro reading of row `k`, and the bias in the truth; `unit` is a record of UNIT."""
+    row, errors = truth[k], noise[k]
+    omega = row.imu_omega_b_rad_s
+    for i in range(3):
+        bias = errors.gyro_bias_b_rad_s[i]
+        turned = unit.M[i, 0] * omega[0] + unit.M[i, 1] * omega[1] + unit.M[i, 2] * omega[2]
+        sensed = turned + bias + errors.gyro_noise_b_rad_s[i]
+        measured[k].gyro_b_rad_s[i] = convert(sensed, unit.step_rad_s, unit.range_rad_s)
+        row.gyro_bias_b_rad_s[i] = bias

@@ -1,0 +1,213 @@
+"""Heading error, direction of travel, return to launch and the height loop, against plane geometry."""
+
+import math
+from dataclasses import astuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from autopilot.autopilot import _PARAMS, _STATE
+from autopilot.guidance import (
+    GuidanceParams,
+    bank_for_heading,
+    bank_to_return,
+    direction_of_travel,
+    gps_age,
+    heading_error,
+    height,
+    hold_height,
+    throttle_for,
+    unit,
+    unseen_turn,
+)
+from estimator.interface import MEASURED_DTYPE
+
+PARAMS = GuidanceParams()
+LIMIT_RAD = math.radians(35.0)
+UNKNOWN = np.full(3, np.nan)
+compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
+angle = st.floats(-math.pi, math.pi)
+course = st.floats(0.0, 2.0 * math.pi)
+
+
+def record():
+    p = np.zeros(1, _PARAMS["guidance"])
+    p[0] = astuple(PARAMS)
+    return p[0]
+
+
+def state():
+    return np.zeros(1, _STATE)[0]
+
+
+def row_of(p_e_m=(0.0, 0.0, -50.0), v_e_m_s=(0.0, 0.0, 0.0), *, t_s=10.0, gps_t_s=9.7, valid=1):
+    rows = np.zeros(1, MEASURED_DTYPE)
+    row = rows[0]
+    row["t_s"], row["gps_t_s"], row["gps_valid"] = t_s, gps_t_s, valid
+    row["gps_p_e_m"], row["gps_v_e_m_s"] = p_e_m, v_e_m_s
+    return row
+
+
+def nose(course_rad, pitch_rad=0.0, roll_rad=0.0):
+    return Rotation.from_euler("ZYX", [course_rad, pitch_rad, roll_rad]).as_matrix()
+
+
+def wrapped(rad):
+    return math.remainder(rad, 2.0 * math.pi)
+
+
+@compiled
+@given(flown=course, wanted=course, pitch=st.floats(-1.5, 1.5), roll=angle)
+def test_heading_error_any_attitude_equals_the_wrapped_course_difference(flown, wanted, pitch, roll):
+    """Cross and dot product of the nose vector give the sine and cosine of the difference, also inverted."""
+    north, east = direction_of_travel(
+        nose(flown, pitch, roll), UNKNOWN, row_of(valid=0), state(), 0, record()
+    )
+    sine, cosine = heading_error(north, east, math.cos(wanted), math.sin(wanted))
+    np.testing.assert_allclose(wrapped(math.atan2(sine, cosine) - (wanted - flown)), 0.0, rtol=0, atol=1e-9)
+
+
+@compiled
+@given(error=angle)
+def test_bank_for_heading_turns_the_shorter_way_and_saturates_beyond_a_right_angle(error):
+    """The bank has the sign of the course difference; more than 90 degrees off it is the limit."""
+    bank = bank_for_heading(math.sin(error), math.cos(error), 0.0, LIMIT_RAD, record())
+    assert abs(bank) <= LIMIT_RAD
+    if 1e-6 < abs(error) < math.pi - 1e-6:
+        assert math.copysign(1.0, bank) == math.copysign(1.0, error)
+    if math.cos(error) < 0.0:
+        assert abs(bank) == LIMIT_RAD
+
+
+def test_bank_for_heading_dead_astern_keeps_to_the_side_of_the_bank():
+    """A reversal with noise on the heading does not flip from one bank to the other."""
+    for r_zy in (-0.3, 0.3):
+        for noise_rad in (-0.1, 0.1):
+            error = math.pi + noise_rad
+            bank = bank_for_heading(math.sin(error), math.cos(error), r_zy, LIMIT_RAD, record())
+            assert bank == math.copysign(LIMIT_RAD, r_zy)
+
+
+@compiled
+@given(heading=course, blows_to=course, speed=st.floats(0.0, 9.0))
+def test_direction_of_travel_nose_with_wind_is_the_wind_triangle(heading, blows_to, speed):
+    """Nose times airspeed plus wind, as complex numbers."""
+    wind = speed * np.array([math.cos(blows_to), math.sin(blows_to), 0.0])
+    over_ground = PARAMS.airspeed_m_s * np.exp(1j * heading) + speed * np.exp(1j * blows_to)
+    north, east = direction_of_travel(nose(heading), wind, row_of(), state(), 1, record())
+    np.testing.assert_allclose(north + 1j * east, over_ground / abs(over_ground), rtol=0, atol=1e-9)
+
+
+def test_direction_of_travel_nose_without_wind_is_the_gps_velocity_turned_on():
+    """The GPS saw north-east; 0.5 rad to the right have been turned since."""
+    s = state()
+    s["unseen_turn_rad"] = 0.5
+    north, east = direction_of_travel(nose(0.0), UNKNOWN, row_of(v_e_m_s=(7.0, 7.0, 0.0)), s, 1, record())
+    np.testing.assert_allclose(math.atan2(east, north), math.pi / 4 + 0.5, rtol=0, atol=1e-12)
+
+
+def test_direction_of_travel_nose_with_neither_wind_nor_gps_is_the_nose():
+    """Nothing else is known."""
+    north, east = direction_of_travel(nose(2.0), UNKNOWN, row_of(valid=0), state(), 1, record())
+    np.testing.assert_allclose(math.atan2(east, north), 2.0, rtol=0, atol=1e-12)
+
+
+def test_unseen_turn_steady_turn_is_rate_times_lag_at_any_bank():
+    """A first-order lag of 1.3 s shows a steady turn 1.3 s late; the rate about the vertical comes from the matrix."""
+    rate_rad_s, lag_s, dt_s = 0.5, 1.3, 0.02
+    R = nose(1.0, 0.1, math.radians(35.0))
+    omega, unseen = R.T @ [0.0, 0.0, rate_rad_s], 0.0
+    for _ in range(1000):  # 15 lags
+        unseen = unseen_turn(unseen, R, omega, lag_s, dt_s)
+    np.testing.assert_allclose(unseen, rate_rad_s * lag_s, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "believed"),
+    [({}, True), ({"valid": 0}, False), ({"gps_t_s": 1.0}, False), ({"p_e_m": (math.nan, 0.0, 0.0)}, False)],
+)
+def test_gps_age_counts_the_filter_and_refuses_what_is_old_absent_or_not_a_number(change, believed):
+    """0.3 s since the stamp and 1 s of filter; infinite where the fix is not to be believed."""
+    age_s = gps_age(row_of(**change), record())
+    assert age_s == (pytest.approx(1.3, rel=0, abs=1e-12) if believed else math.inf)
+
+
+def test_height_climbing_is_moved_on_by_the_age_of_the_fix():
+    """30 m and 2 m/s up, 1.3 s ago: 32.6 m now."""
+    np.testing.assert_allclose(height(row_of((0, 0, -30.0), (0, 0, -2.0)), record()), 32.6, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("height_m", "climb_m_s"), [(1000.0, 3.0), (52.0, 0.5), (50.0, 0.0), (48.0, -0.5), (0.0, -2.0)]
+)
+def test_hold_height_demands_a_limited_climb(height_m, climb_m_s):
+    """Climb per height missing, not above 3 m/s nor below -2 m/s; pitch and throttle follow together."""
+    pitch, throttle = hold_height(height_m, row_of(), state(), record(), 0.0)
+    expected = PARAMS.pitch_trim_rad + climb_m_s / PARAMS.airspeed_m_s
+    np.testing.assert_allclose(pitch, min(expected, PARAMS.pitch_limit_rad), rtol=0, atol=1e-12)
+    wanted = PARAMS.throttle_trim + PARAMS.throttle_per_climb_s_m * climb_m_s
+    np.testing.assert_allclose(throttle, max(wanted, PARAMS.throttle_least), rtol=0, atol=1e-12)
+
+
+def test_hold_height_without_gps_is_level_flight_at_cruise():
+    """No fix, no climb: trim pitch and trim throttle."""
+    demand = hold_height(100.0, row_of(valid=0), state(), record(), 0.02)
+    np.testing.assert_allclose(demand, (PARAMS.pitch_trim_rad, PARAMS.throttle_trim), rtol=0, atol=1e-12)
+
+
+def test_throttle_for_pitch_grows_and_stays_within_limits():
+    """More pitch, more throttle; never off, never above full."""
+    throttles = [throttle_for(math.radians(d), record()) for d in (-40.0, 0.0, 5.0, 60.0)]
+    assert throttles[0] == PARAMS.throttle_least
+    assert throttles[-1] == 1.0
+    assert throttles[0] < throttles[1] < throttles[2] < throttles[3]
+
+
+@compiled
+@given(bearing=course, flown=course, distance=st.floats(80.0, 2000.0))
+def test_bank_to_return_turns_towards_the_launch_point(bearing, flown, distance):
+    """The bank has the sign of the angle from the course flown to the bearing of the launch point."""
+    at = distance * np.array([math.cos(bearing), math.sin(bearing)])
+    north, east = unit(math.cos(flown), math.sin(flown))
+    bank = bank_to_return(north, east, 0.0, row_of((*at, -50.0)), state(), LIMIT_RAD, record())
+    off = wrapped(bearing + math.pi - flown)
+    if 1e-6 < abs(off) < math.pi - 1e-6:
+        assert math.copysign(1.0, bank) == math.copysign(1.0, off)
+
+
+def test_bank_to_return_without_position_circles_gently():
+    """Straight on would be away."""
+    bank = bank_to_return(1.0, 0.0, 0.0, row_of(valid=0), state(), LIMIT_RAD, record())
+    assert bank == PARAMS.circling_bank_rad
+
+
+def fly_flat(start_m, course_rad, wind_m_s, seconds):
+    """Positions (complex, north + i east) of a point that turns as its bank demands, at cruise in a wind."""
+    dt_s, g, v = 0.02, 9.80665, PARAMS.airspeed_m_s
+    at, heading, bank, s, p = complex(*start_m), course_rad, 0.0, state(), record()
+    path = []
+    for _ in range(round(seconds / dt_s)):
+        over_ground = v * np.exp(1j * heading) + wind_m_s
+        old = at - 1.3 * over_ground  # where and how it was when the fix was true
+        row = row_of((old.real, old.imag, -50.0), (over_ground.real, over_ground.imag, 0.0))
+        towards = over_ground / abs(over_ground)
+        demand = bank_to_return(towards.real, towards.imag, math.sin(bank), row, s, LIMIT_RAD, p)
+        bank += (demand - bank) * dt_s / 0.4
+        heading += g / v * math.tan(bank) * dt_s
+        at += over_ground * dt_s
+        path.append(at)
+    return np.array(path)
+
+
+@pytest.mark.parametrize("from_deg", range(0, 360, 45))
+def test_bank_to_return_any_wind_passes_the_launch_point_again_and_again(from_deg):
+    """From 300 m, heading away, in 5 m/s: over the point within 60 s, and at least twice more; no endless circle."""
+    wind = -5.0 * np.exp(1j * math.radians(from_deg))
+    distance = abs(fly_flat((300.0, 0.0), 0.0, wind, 180.0))
+    near = distance < PARAMS.passed_m
+    passes = np.flatnonzero(near[1:] & ~near[:-1])
+    assert len(passes) >= 3
+    assert passes[0] * 0.02 < 60.0

@@ -1,0 +1,98 @@
+"""The throw is felt, and nothing else is."""
+
+import math
+from dataclasses import astuple
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from autopilot.autopilot import _PARAMS, _STATE, DcmAutopilot
+from autopilot.guidance import GuidanceParams
+from autopilot.interface import Mode, Setpoint
+from autopilot.launch import LaunchParams, climb_away, feel_throw
+from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
+
+G_M_S2 = 9.80665
+DT_S = 0.02
+PARAMS = LaunchParams()
+GUIDANCE = GuidanceParams()
+
+
+def record(group, params):
+    p = np.zeros(1, _PARAMS[group])
+    p[0] = astuple(params)
+    return p[0]
+
+
+def feel(forces_x, R_eb):
+    """Ticks until the throw is felt, or None."""
+    s, p = np.zeros(1, _STATE)[0], record("launch", PARAMS)
+    s["thrown_s"] = -1.0
+    row = np.zeros(1, MEASURED_DTYPE)[0]
+    for k, force_x in enumerate(forces_x):
+        row["force_b_m_s2"] = (force_x, 0.0, -G_M_S2)
+        if feel_throw(R_eb, row, s, p, DT_S) >= 0.0:
+            return k + 1
+    return None
+
+
+def pitched(degrees):
+    return Rotation.from_euler("Y", degrees, degrees=True).as_matrix()
+
+
+@pytest.mark.parametrize("pitch_deg", [-60.0, 0.0, 12.0, 45.0, 90.0])
+def test_feel_throw_held_and_swayed_for_two_seconds_is_not_felt(pitch_deg):
+    """Gravity at any pitch, with 0.5 g of sway at 1 Hz on it and noise of 0.02 g, is no throw."""
+    t_s = np.arange(100) * DT_S
+    noise = np.random.Generator(np.random.PCG64(1)).normal(0.0, 0.02 * G_M_S2, 100)
+    gravity = G_M_S2 * math.sin(math.radians(pitch_deg))  # specific force of rest: minus gravity
+    forces = gravity + 0.5 * G_M_S2 * np.sin(2 * math.pi * t_s) + noise
+    assert feel(forces, pitched(pitch_deg)) is None
+
+
+def test_feel_throw_knock_of_one_tick_is_not_felt():
+    """A 3 g knock that lasts one sample is no throw."""
+    assert feel([0.0] * 10 + [3.0 * G_M_S2] + [0.0] * 10, np.eye(3)) is None
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 12.0])
+def test_feel_throw_push_of_2_75_g_is_felt_within_a_tenth_of_a_second(pitch_deg):
+    """The throw of the hand launch, 27 m/s2 along the nose."""
+    force = 2.75 * G_M_S2 + G_M_S2 * math.sin(math.radians(pitch_deg))
+    ticks = feel([force] * 10, pitched(pitch_deg))
+    assert ticks is not None
+    assert ticks * DT_S <= 0.1
+
+
+def test_climb_away_follows_the_throw_from_no_power_to_the_height():
+    """Motor off in the hand and for the fingers, then full; the climb ends below the height and stays ended."""
+    s, p, g = np.zeros(1, _STATE)[0], record("launch", PARAMS), record("guidance", GUIDANCE)
+    row = np.zeros(1, MEASURED_DTYPE)[0]
+    row["gps_valid"] = 1
+
+    def at(thrown_s, height_m):
+        row["gps_p_e_m"] = (0.0, 0.0, -height_m)
+        return climb_away(thrown_s, 50.0, row, s, p, g, DT_S)
+
+    assert at(-1.0, 1.7) == (PARAMS.first_pitch_rad, 0.0)
+    assert at(0.1, 1.7) == (PARAMS.first_pitch_rad, 0.0)
+    assert at(0.3, 1.7) == (PARAMS.first_pitch_rad, 1.0)
+    assert at(5.0, 20.0) == (PARAMS.climb_pitch_rad, 1.0)
+    near_pitch, near_throttle = at(12.0, 49.0)
+    assert near_pitch < PARAMS.climb_pitch_rad
+    assert near_throttle < 1.0
+    assert s["levelled_off"] == 1
+    pitch, _ = at(13.0, 40.0)  # below the height again: the height loop goes on, not the launch
+    assert pitch == min(GUIDANCE.pitch_trim_rad + 2.5 / GUIDANCE.airspeed_m_s, GUIDANCE.pitch_limit_rad)
+
+
+def test_launch_mode_in_the_hand_keeps_motor_off_and_learns_nothing():
+    """However long it is held tilted, the throttle stays at 0 (though the set-point asks) and no integral winds up."""
+    autopilot, held = DcmAutopilot(), Setpoint(Mode.LAUNCH, throttle=1.0)
+    rows = np.zeros(1, MEASURED_DTYPE)
+    rows["dt_s"] = DT_S
+    tilted = AttitudeEstimate(Rotation.from_euler("ZYX", [0.3, 0.2, 0.4]).as_matrix())
+    commands = {autopilot.update(tilted, Measurements(rows, 0), held) for _ in range(500)}
+    assert len(commands) == 1
+    assert commands.pop().throttle == 0.0

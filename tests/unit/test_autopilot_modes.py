@@ -1,0 +1,206 @@
+"""The autopilot as a whole: its modes, its mixer, its set-points and its scripts."""
+
+import math
+from dataclasses import astuple
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from autopilot.autopilot import _PARAMS, AutopilotParams, DcmAutopilot
+from autopilot.guidance import GuidanceParams
+from autopilot.interface import Mode, Setpoint
+from autopilot.mixer import MixerParams, mix
+from autopilot.pilot import Script, Timed, inside_loops, reversals
+from autopilot.stabilise import StabiliseParams
+from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
+
+LEVEL = AttitudeEstimate(np.eye(3))
+
+
+def measurements(*, north_m=0.0, height_m=50.0, force_x=0.0):
+    rows = np.zeros(1, MEASURED_DTYPE)
+    rows["t_s"], rows["dt_s"], rows["gps_t_s"], rows["gps_valid"] = 10.0, 0.02, 9.7, 1
+    rows["gps_p_e_m"], rows["force_b_m_s2"] = (north_m, 0.0, -height_m), (force_x, 0.0, -9.8)
+    return Measurements(rows, 0)
+
+
+def estimate(heading=0.0, pitch=0.0, roll=0.0, omega=(0.0, 0.0, 0.0), wind=None):
+    R = Rotation.from_euler("ZYX", [heading, pitch, roll]).as_matrix()
+    return AttitudeEstimate(R, np.array(omega), np.zeros(3), wind)
+
+
+def test_manual_passes_the_sticks_through():
+    """Manual: surfaces are the sticks, the throttle is off unless given, nothing is held."""
+    autopilot = DcmAutopilot()
+    command = autopilot.update(LEVEL, measurements(), Setpoint(Mode.MANUAL, 0.3, -0.4, 0.5))
+    assert command[:5] == (0.3, -0.4, 0.5, 0.0, Mode.MANUAL)
+    assert math.isnan(command.bank_demand_rad)
+    assert math.isnan(command.pitch_demand_rad)
+    assert autopilot.update(LEVEL, measurements(), Setpoint(Mode.MANUAL, throttle=0.7)).throttle == 0.7
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_rate_commands_the_surface_of_its_axis_in_its_sense(axis):
+    """Rate: roll right, nose up, nose right each move their own surface to the positive side."""
+    rate = [0.0, 0.0, 0.0]
+    rate[axis] = 0.8
+    command = DcmAutopilot().update(LEVEL, measurements(), Setpoint(Mode.RATE, rate_b_rad_s=tuple(rate)))
+    assert command[axis] > 0.05
+    assert math.isnan(command.bank_demand_rad)
+
+
+def test_stabilise_holds_what_is_asked_and_reports_it():
+    """Stabilise: bank and pitch demand are the set-point's, aileron and elevator lead there."""
+    setpoint = Setpoint(Mode.STABILISE, bank_rad=0.3, pitch_rad=0.2)
+    command = DcmAutopilot().update(LEVEL, measurements(), setpoint)
+    assert (command.bank_demand_rad, command.pitch_demand_rad) == (0.3, 0.2)
+    assert command.aileron > 0.0
+    assert command.elevator > 0.0
+
+
+def test_course_demands_bank_towards_the_course_and_climb_towards_the_height():
+    """Course: east is to the right of north, 80 m are above 50 m."""
+    setpoint = Setpoint(Mode.COURSE, course_rad=math.pi / 2, height_m=80.0)
+    command = DcmAutopilot().update(LEVEL, measurements(), setpoint)
+    assert command.bank_demand_rad == setpoint.bank_limit_rad
+    assert command.pitch_demand_rad > GuidanceParams().pitch_trim_rad
+    assert command.throttle > GuidanceParams().throttle_trim
+
+
+def test_course_nose_estimator_crabs_into_the_wind():
+    """Heading north in a wind to the east, wanted north: turn left, into the wind; a course estimator is content."""
+    north = Setpoint(Mode.COURSE, course_rad=0.0)
+    windy = estimate(wind=np.array([0.0, 5.0, 0.0]))
+    assert DcmAutopilot(heading_reference="nose").update(windy, measurements(), north).bank_demand_rad < -0.1
+    assert (
+        DcmAutopilot(heading_reference="course").update(windy, measurements(), north).bank_demand_rad == 0.0
+    )
+
+
+def test_return_heading_away_turns_back_at_the_limit_and_heading_home_flies_straight():
+    """Return: launch point to the south."""
+    home = Setpoint(Mode.RETURN)
+    away = DcmAutopilot().update(estimate(0.1), measurements(north_m=300.0), home)
+    assert abs(away.bank_demand_rad) == home.bank_limit_rad
+    towards = DcmAutopilot().update(estimate(math.pi), measurements(north_m=300.0), home)
+    assert towards.bank_demand_rad == pytest.approx(0.0, rel=0, abs=1e-9)
+
+
+def test_launch_throw_starts_the_motor_after_the_delay():
+    """Launch: wings level throughout, motor 0.2 s after the throw is felt."""
+    autopilot, setpoint = DcmAutopilot(), Setpoint(Mode.LAUNCH)
+    thrown, flying = measurements(height_m=1.7, force_x=27.0), measurements(height_m=1.7)
+    commands = [autopilot.update(LEVEL, thrown if k < 15 else flying, setpoint) for k in range(40)]
+    on = next(k for k, c in enumerate(commands) if c.throttle > 0.0)
+    assert 10 <= on <= 15
+    assert all(c.throttle == 1.0 for c in commands[on:])
+    assert all(c.bank_demand_rad == 0.0 for c in commands)
+
+
+def test_mode_change_back_to_launch_waits_for_a_new_throw():
+    """The throw of an earlier launch does not start the motor of the next."""
+    autopilot, launch = DcmAutopilot(), Setpoint(Mode.LAUNCH)
+    for _ in range(20):
+        thrown = autopilot.update(LEVEL, measurements(height_m=1.7, force_x=27.0), launch)
+    assert thrown.throttle == 1.0
+    assert autopilot.update(LEVEL, measurements(), Setpoint(Mode.STABILISE)).mode == Mode.STABILISE
+    assert autopilot.update(LEVEL, measurements(), launch).throttle == 0.0
+
+
+def test_mode_change_out_of_rate_forgets_the_integral_of_the_manoeuvre():
+    """After a pull the level flight begins with the elevator of a new autopilot, not with the pull's."""
+    autopilot, level = DcmAutopilot(), Setpoint(Mode.STABILISE)
+    pull = Setpoint(Mode.RATE, rate_b_rad_s=(0.0, 0.3, 0.0))
+    for _ in range(100):
+        autopilot.update(LEVEL, measurements(), pull)
+    assert autopilot.update(LEVEL, measurements(), level) == DcmAutopilot().update(
+        LEVEL, measurements(), level
+    )
+
+
+def test_setpoint_throttle_overrides_the_autopilot_where_given():
+    """A number is obeyed, NaN leaves the throttle to the autopilot."""
+    for mode in (Mode.RATE, Mode.STABILISE, Mode.COURSE, Mode.RETURN):
+        assert DcmAutopilot().update(LEVEL, measurements(), Setpoint(mode, throttle=0.25)).throttle == 0.25
+        assert DcmAutopilot().update(LEVEL, measurements(), Setpoint(mode)).throttle > 0.25
+
+
+def test_heading_reference_unknown_is_refused():
+    """One line that says what there is."""
+    with pytest.raises(ValueError, match="heading_reference 'track': must be 'course' or 'nose'"):
+        DcmAutopilot(heading_reference="track")
+
+
+def test_params_reach_the_kernel():
+    """Every group of parameters is packed where the kernel reads it."""
+    params = AutopilotParams(StabiliseParams(aileron_per_roll_rate_s=0.0, aileron_per_rate_error_s=0.0))
+    banked = estimate(roll=0.5)
+    setpoint = Setpoint(Mode.STABILISE)
+    assert DcmAutopilot(params).update(banked, measurements(), setpoint).aileron == 0.0
+    trimmed = AutopilotParams(mixer=MixerParams(aileron_trim=0.125))
+    assert DcmAutopilot(trimmed).update(LEVEL, measurements(), setpoint).aileron == 0.125
+
+
+@pytest.mark.parametrize("limit", [1.0, 0.5])
+def test_mix_beyond_the_limits_is_held(limit):
+    """Surfaces stay within their share of the travel, the throttle within 0..1."""
+    p = np.zeros(1, _PARAMS["mixer"])
+    p[0] = astuple(MixerParams(surface_limit=limit))
+    assert mix(9.0, -9.0, 9.0, 9.0, p[0]) == (limit, -limit, limit, 1.0)
+    assert mix(-9.0, 9.0, -9.0, -9.0, p[0]) == (-limit, limit, -limit, 0.0)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"aileron": 1.5}, {"elevator": math.nan}, {"rudder": -2.0}, {"bank_rad": 3.0}, {"pitch_rad": math.inf},
+        {"course_rad": math.nan}, {"height_m": math.nan}, {"bank_limit_rad": -0.1}, {"throttle": 1.1},
+        {"rate_b_rad_s": (0.0, math.nan, 0.0)}, {"rate_b_rad_s": (0.0, 0.0)},
+    ],
+)  # fmt: skip
+def test_setpoint_out_of_range_is_refused_by_name(wrong):
+    """What no aeroplane can be asked is refused before the flight, naming the field."""
+    with pytest.raises(ValueError, match=f"Setpoint.{next(iter(wrong))}: "):
+        Setpoint(Mode.STABILISE, **wrong)
+
+
+def test_script_gives_the_setpoint_in_force():
+    """From its time on, exactly; the first also before, the last for ever; the same object, not a copy."""
+    first, second = Setpoint(Mode.LAUNCH), Setpoint(Mode.RETURN)
+    script = Script([Timed(0.0, first), Timed(20.0, second)])
+    assert [script.at(t) for t in (-9.0, 0.0, 19.99)] == [first] * 3
+    assert script.at(20.0) is script.at(1e9) is second
+    assert list(script) == [Timed(0.0, first), Timed(20.0, second)]
+
+
+@pytest.mark.parametrize("times", [(), (0.0, 0.0), (1.0, 0.5), (0.0, math.nan)])
+def test_script_without_order_is_refused(times):
+    """No set-point, equal times, decreasing times, no time."""
+    with pytest.raises(ValueError, match=r"^Script: "):
+        Script([(t, Setpoint(Mode.RETURN)) for t in times])
+
+
+def test_inside_loops_end_when_the_pitch_rate_has_turned_them():
+    """Three loops at 90 deg/s are twelve seconds after the run-in."""
+    after = Setpoint(Mode.COURSE)
+    loops = inside_loops(10.0, 3, after, pitch_rate_rad_s=math.pi / 2, run_in_s=3.0)
+    script = Script(loops.timed)
+    assert loops.ends_s == pytest.approx(25.0, rel=0, abs=1e-12)
+    assert script.at(12.9).mode == Mode.STABILISE
+    assert script.at(13.1).rate_b_rad_s == (0.0, math.pi / 2, 0.0)
+    assert script.at(24.9).throttle == 1.0
+    assert script.at(25.1) is after
+    with pytest.raises(ValueError, match="inside_loops: count 0"):
+        inside_loops(0.0, 0, after)
+
+
+def test_reversals_alternate_between_the_course_and_its_opposite():
+    """Three reversals of a northerly course: south, north, south."""
+    turns = reversals(20.0, 40.0, 3, Setpoint(Mode.COURSE, course_rad=0.0, height_m=60.0))
+    assert [t.t_s for t in turns.timed] == [20.0, 60.0, 100.0]
+    north = [math.cos(t.setpoint.course_rad) for t in turns.timed]
+    np.testing.assert_allclose(north, [-1.0, 1.0, -1.0], rtol=0, atol=1e-12)
+    assert all(t.setpoint.height_m == 60.0 for t in turns.timed)
+    with pytest.raises(ValueError, match="COURSE"):
+        reversals(0.0, 40.0, 3, Setpoint(Mode.RETURN))

@@ -1,0 +1,74 @@
+"""The building blocks of the sensors' errors against closed forms and chi-square bounds."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from sim.rng import stream
+from sim.sensors.noise import convert, gauss_markov, random_walk, sample_sigma, step_of
+
+DOUBTED_ONCE_IN = 1e-5  # probability of a chi-square outside its bounds by chance
+
+
+def assert_sigma(samples, sigma):
+    """The sample variance about a mean of zero lies within the chi-square bounds of independent `samples`."""
+    n = np.size(samples)
+    low, high = stats.chi2.ppf([DOUBTED_ONCE_IN / 2, 1 - DOUBTED_ONCE_IN / 2], n)
+    assert low <= np.sum(np.square(samples)) / sigma**2 <= high
+
+
+def test_convert_levels_are_exact_and_clip_as_twos_complement():
+    """A 10-bit converter over +-300 has 1024 levels of 600 / 1024 from -300 to one step below +300."""
+    step = step_of(300.0, 10)
+    assert step == 600.0 / 1024.0
+    levels = np.unique([convert(x, step, 300.0) for x in np.linspace(-400.0, 400.0, 20_001)])
+    np.testing.assert_array_equal(levels, step * np.arange(-512, 512))
+    assert convert(1e9, step, 300.0) == 300.0 - step
+    assert convert(-1e9, step, 300.0) == -300.0
+
+
+def test_convert_within_range_errs_by_half_a_step_at_most():
+    """Quantisation rounds to the nearest level."""
+    step = step_of(3.0, 10)
+    x = np.random.default_rng(2).uniform(-2.99, 2.99, 5000)
+    error = np.array([convert(v, step, 3.0) for v in x]) - x
+    assert np.abs(error).max() <= step / 2 + 1e-15
+    assert np.abs(error).max() >= 0.49 * step
+
+
+@pytest.mark.parametrize("x", [-5.0, -1.234567, 0.0, 1.234567, 5.0])
+def test_convert_without_bits_only_clips(x):
+    """Zero bits: the value itself, within the range; an infinite range passes everything."""
+    assert step_of(2.0, 0) == 0.0
+    assert convert(x, 0.0, 2.0) == min(max(x, -2.0), 2.0)
+    assert convert(x, 0.0, math.inf) == x
+
+
+def test_sample_sigma_grows_with_the_root_of_the_rate():
+    """One noise density: four times the rate, twice the sigma; the figure itself is for 50 Hz."""
+    assert sample_sigma(0.3, 50) == 0.3
+    np.testing.assert_allclose(sample_sigma(0.3, 200), 0.6, rtol=0, atol=1e-15)
+
+
+def test_random_walk_grows_with_the_root_of_time():
+    """Sigma after t seconds is sigma sqrt(t), at several times and two rates."""
+    for dt_s in (0.02, 0.005):
+        walks = np.stack(
+            [random_walk(stream(1, i, "w").standard_normal((round(16 / dt_s), 3)), 0.7, dt_s) for i in range(200)]
+        )
+        for t_s in (1, 4, 16):
+            assert_sigma(walks[:, round(t_s / dt_s) - 1], 0.7 * math.sqrt(t_s))
+
+
+def test_gauss_markov_is_stationary_with_the_given_sigma_and_correlation_time():
+    """Sigma is the same at the start and later; the correlation after T is 1 / e."""
+    sigma, T_s, dt_s = np.array([1.5, 1.5, 2.5]), 3.0, 0.02
+    runs = np.stack([gauss_markov(stream(2, i, "g").standard_normal((301, 3)), sigma, T_s, dt_s) for i in range(1500)])
+    for k in (0, 50, 300):
+        assert_sigma(runs[:, k] / sigma, 1.0)
+    before, after = runs[:, 100] / sigma, runs[:, 250] / sigma  # 150 ticks of 0.02 s: T apart
+    # What is new after T is independent of what was: its variance is 1 - exp(-2).
+    assert_sigma(after - before / math.e, math.sqrt(1.0 - math.exp(-2.0)))
+    assert abs(np.mean(before * after) - 1.0 / math.e) <= 4.5 * math.sqrt(1.0 + math.exp(-2.0)) / math.sqrt(before.size)
