@@ -28,7 +28,7 @@ class GuidanceParams:
     climb_per_height_1_s, climb_limit_m_s, sink_limit_m_s : climb demanded per height missing, and its limits
     pitch_trim_rad : pitch of level flight at cruise       pitch_limit_rad : the steepest demanded
     throttle_trim, throttle_per_climb_s_m : for level flight, and per climb rate
-    throttle_per_height_1_m_s : integral of the height missing; power pays for height, not angle of attack
+    pitch_per_height_rad_m_s, pitch_integral_limit_rad : integral of the height missing, and the most it holds
     throttle_least : keeps air over the tail
     """
 
@@ -46,7 +46,8 @@ class GuidanceParams:
     pitch_limit_rad: float = math.radians(15.0)
     throttle_trim: float = 0.6
     throttle_per_climb_s_m: float = 0.085
-    throttle_per_height_1_m_s: float = 0.004
+    pitch_per_height_rad_m_s: float = 0.002
+    pitch_integral_limit_rad: float = math.radians(8.0)
     throttle_least: float = 0.1
 
 
@@ -156,19 +157,20 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Pitch demand, rad, and throttle, 0..1, that lead slowly to a height and hold it.
 
     Pitch and throttle follow the same climb demand, so that the speed, which nobody measures, stays near
-    cruise; the integral works on the throttle alone.  Without a height: level flight at cruise.
+    cruise.  The integral takes up an estimate that is wrong in pitch; were it on the throttle, the speed
+    would pay for that error.  Without a height: level flight at cruise.
 
-    height_m : demanded   row : measured   s : record with `throttle_integral`, updated
+    height_m : demanded   row : measured   s : record with `height_integral_rad`, updated
     """
     missing_m = height_m - height(row, p)
     climb_m_s = 0.0
     if math.isfinite(missing_m):
         climb_m_s = clip(p.climb_per_height_1_s * missing_m, -p.sink_limit_m_s, p.climb_limit_m_s)
         if abs(missing_m) < 10.0:
-            integral = s.throttle_integral + p.throttle_per_height_1_m_s * missing_m * dt_s
-            s.throttle_integral = clip(integral, -0.3, 0.3)
-    pitch_rad = p.pitch_trim_rad + climb_m_s / p.airspeed_m_s
-    throttle = p.throttle_trim + p.throttle_per_climb_s_m * climb_m_s + s.throttle_integral
+            integral_rad = s.height_integral_rad + p.pitch_per_height_rad_m_s * missing_m * dt_s
+            s.height_integral_rad = clip(integral_rad, -p.pitch_integral_limit_rad, p.pitch_integral_limit_rad)
+    pitch_rad = p.pitch_trim_rad + climb_m_s / p.airspeed_m_s + s.height_integral_rad
+    throttle = p.throttle_trim + p.throttle_per_climb_s_m * climb_m_s
     return clip(pitch_rad, -p.pitch_limit_rad, p.pitch_limit_rad), clip(throttle, p.throttle_least, 1.0)
 
 

@@ -79,7 +79,7 @@ class ActuatorCommand(NamedTuple):
     elevator: float
     rudder: float
     throttle: float
-    mode: int = Mode.MANUAL
+    mode: int = int(Mode.MANUAL)  # a plain int: numba takes tens of microseconds to look at an enum
     bank_demand_rad: float = math.nan
     pitch_demand_rad: float = math.nan
 

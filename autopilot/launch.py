@@ -7,7 +7,7 @@ high in the hand is not a throw; sway and knocks are short against the mean that
 import math
 from dataclasses import dataclass
 
-from autopilot.guidance import height, hold_height
+from autopilot.guidance import height, hold_height, throttle_for
 from autopilot.stabilise import G_M_S2
 from estimator.jit import kernel
 
@@ -17,18 +17,18 @@ class LaunchParams:
     """When it is a throw, and how to climb away.
 
     throw_m_s2, throw_mean_s : mean acceleration along the nose that is a throw, time constant of that mean
-    motor_delay_s : from the throw felt to full throttle, for the fingers
+    motor_delay_s : from the throw felt to full throttle; it has no thrust before the hand is gone
+    full_throttle_s : after the throw the throttle is that of the climb at cruise speed
     level_off_m : below the height, where the climb at constant pitch ends and the height loop takes over
-    climb_pitch_rad : demanded in the climb     first_pitch_rad, first_s : and at first, while speed is gained
+    climb_pitch_rad : demanded from the hand to the height
     """
 
     throw_m_s2: float = 0.8 * G_M_S2
     throw_mean_s: float = 0.1
-    motor_delay_s: float = 0.2
+    motor_delay_s: float = 0.1
+    full_throttle_s: float = 2.0
     level_off_m: float = 5.0
-    climb_pitch_rad: float = math.radians(14.0)
-    first_pitch_rad: float = math.radians(10.0)
-    first_s: float = 1.5
+    climb_pitch_rad: float = math.radians(12.0)
 
 
 @kernel
@@ -58,10 +58,12 @@ def climb_away(thrown_s, height_m, row, s, p, guidance, dt_s):  # type: ignore[n
     p, guidance : records of LaunchParams, GuidanceParams
     """
     if thrown_s < 0.0:
-        return p.first_pitch_rad, 0.0
+        return p.climb_pitch_rad, 0.0
     if height(row, guidance) > height_m - p.level_off_m:  # False where there is no height
         s.levelled_off = 1
     if s.levelled_off:
         return hold_height(height_m, row, s, guidance, dt_s)
-    throttle = 1.0 if thrown_s >= p.motor_delay_s else 0.0
-    return (p.first_pitch_rad if thrown_s < p.first_s else p.climb_pitch_rad), throttle
+    if thrown_s < p.motor_delay_s:
+        return p.climb_pitch_rad, 0.0
+    throttle = 1.0 if thrown_s < p.full_throttle_s else throttle_for(p.climb_pitch_rad, guidance)
+    return p.climb_pitch_rad, throttle

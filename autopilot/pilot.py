@@ -61,11 +61,12 @@ def inside_loops(
     count: int,
     after: Setpoint,
     *,
-    pitch_rate_rad_s: float = math.radians(110.0),
+    pitch_rate_rad_s: float = math.radians(100.0),
     run_in_s: float = 3.0,
-    run_in_pitch_rad: float = math.radians(-8.0),
+    run_in_pitch_rad: float = 0.0,
+    throttle: float = 1.0,
 ) -> Manoeuvre:
-    """Inside loops at a constant pitch rate and full throttle, after a run-in that gathers speed.
+    """Inside loops at a constant pitch rate, wings left alone, after a run-in that gathers speed.
 
     Parameters
     ----------
@@ -73,7 +74,8 @@ def inside_loops(
     count               loops
     after               what to fly when the last loop ends: level flight, usually
     pitch_rate_rad_s    slower is larger and asks more speed at the top, quicker asks more lift at the bottom
-    run_in_s, run_in_pitch_rad   shallow dive, wings level, before the pull
+    run_in_s, run_in_pitch_rad   wings level, before the pull: time and pitch
+    throttle            of run-in and loops, 0..1
 
     Returns
     -------
@@ -86,8 +88,8 @@ def inside_loops(
         )
     pull_s = begin_s + run_in_s
     ends_s = pull_s + count * 2.0 * math.pi / pitch_rate_rad_s
-    run_in = Setpoint(Mode.STABILISE, pitch_rad=run_in_pitch_rad, throttle=1.0)
-    pull = Setpoint(Mode.RATE, rate_b_rad_s=(0.0, pitch_rate_rad_s, 0.0), throttle=1.0)
+    run_in = Setpoint(Mode.STABILISE, pitch_rad=run_in_pitch_rad, throttle=throttle)
+    pull = Setpoint(Mode.RATE, rate_b_rad_s=(0.0, pitch_rate_rad_s, 0.0), throttle=throttle)
     return Manoeuvre((Timed(begin_s, run_in), Timed(pull_s, pull), Timed(ends_s, after)), ends_s)
 
 

@@ -42,11 +42,11 @@ class StabiliseParams:
     aileron_per_roll_rate_s: float = 0.3
     aileron_per_rate_error_s: float = 0.12
     aileron_per_roll_error: float = 0.12
-    elevator_per_pitch_rate_s: float = 0.38
-    elevator_per_rate_error_s: float = 0.15
-    elevator_per_pitch_error: float = 0.5
+    elevator_per_pitch_rate_s: float = 0.25
+    elevator_per_rate_error_s: float = 0.35
+    elevator_per_pitch_error: float = 1.0
     elevator_per_load: float = 0.155
-    load_limit: float = 4.0
+    load_limit: float = 3.0
     rudder_per_yaw_rate_s: float = 0.1
     rudder_per_rate_error_s: float = 0.3
     integral_limit: float = 0.3

@@ -1,15 +1,15 @@
 """Two estimators to measure the others against: gyros alone, and the accelerometer taken at its word.
 
 `GyroOnly` shows what drift correction is worth: it is Eqns 16-21 of the paper without feedback.
-`AccelerometerOnly` takes the pull of gravity for whatever the accelerometer feels, as the paper's authors once
-tried in a hand launch: "The controls responded by pitching the plane straight down."
+`AccelerometerOnly` takes whatever the accelerometer feels for the pull of gravity.  One of the paper's authors
+tried that in a hand launch: the push was felt as a climb, and the controls dived.
 
 References
 ----------
 W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009, section "Accelerometers".
 """
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -79,8 +79,8 @@ class GyroOnly(Compiled):
     """Eqns 16-21 without drift correction: gyros from power-up on, the offset measured there."""
 
     heading_reference: HeadingReference = "nose"
-    _step: Any = staticmethod(step)
-    _replay: Any = staticmethod(_replay)
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
     _tilt_from_force = False
 
     def __init__(self) -> None:
@@ -88,7 +88,7 @@ class GyroOnly(Compiled):
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample of something at rest, or zero and level; heading north."""
+        """Power up: gyro offset and tilt from the mean sample of something at rest; without, zero and level."""
         s = self._state[0]
         self._state.fill(0)
         s["tilt_from_force"] = self._tilt_from_force

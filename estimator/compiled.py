@@ -4,7 +4,6 @@ An estimator module owns its kernel ``step(rows, k, state) -> Health``, runs it 
 and lets `Compiled` speak the `AttitudeEstimator` protocol.  Its state starts with the columns of `BELIEF`.
 """
 
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -38,8 +37,8 @@ def write_estimate(s, health, estimate):  # type: ignore[no-untyped-def]
 class Compiled:
     """An estimator around the kernels `_step` and `_replay` and a state record; a subclass brings these and `reset`."""
 
-    _step: ClassVar[Callable[..., int]]
-    _replay: ClassVar[Callable[..., None]]
+    _step: ClassVar[Any]
+    _replay: ClassVar[Any]
 
     def __init__(self, state_dtype: np.dtype[Any]) -> None:
         self._state = np.zeros(1, state_dtype)

@@ -19,7 +19,7 @@ correction of attitude, no rotation of the aeroplane, and would be taken for cen
 
 Beyond the paper
 ----------------
-Each has a parameter that turns it off.
+Each but the yaw lock has a parameter that turns it off.
 
 *GPS-lag filter* (the paper names it, without equations).  The nose passes the receiver's own filter and latency
 before it meets the course.  Two things follow.  A vector filter also shrinks the speed of a turning aeroplane: it
@@ -44,7 +44,7 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 
 import math
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -108,16 +108,19 @@ class PremerlaniParams:
     force_range_m_s2: float = FORCE_RANGE_M_S2
 
     def __post_init__(self) -> None:
-        for name in ("w_rp", "w_y", "k_p", "k_i", "gps_filter_s", "gps_latency_s", "min_speed_m_s"):
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise ValueError(f"{name} is {value}; it must be a finite number, zero or more")
-        for name in ("offset_limit_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2"):
-            value = getattr(self, name)
-            if not value > 0.0:
-                raise ValueError(f"{name} is {value}; it must be more than zero (inf turns it off)")
+        positive = ("offset_limit_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2")
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.name in positive:
+                if not value > 0.0:
+                    raise ValueError(f"{f.name} is {value}; it must be more than zero")
+            elif not 0.0 <= value < math.inf:
+                raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
+        for name in ("gyro_range_rad_s", "force_range_m_s2"):
+            if getattr(self, name) > 1e4:
+                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
         if self.gps_latency_s > LONGEST_LATENCY_S:
-            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; at most {LONGEST_LATENCY_S} s are remembered")
+            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
 
 
 _PARAMS = tuple(
@@ -179,7 +182,7 @@ def filter_nose(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def recall_nose(s, t_s):  # type: ignore[no-untyped-def]
-    """Set ``s.nose_at_fix`` to the filtered nose at `t_s`, between two remembered ones; the oldest if none is so old."""
+    """Set ``s.nose_at_fix`` to the filtered nose at `t_s`, between two remembered ones, or the oldest there is."""
     t1, x1, y1 = s.clock_s, s.nose[0], s.nose[1]
     for back in range(HISTORY):
         i = (s.newest - back) % HISTORY
@@ -324,8 +327,8 @@ class Premerlani(Compiled):
     """
 
     heading_reference: HeadingReference = "course"
-    _step: Any = staticmethod(step)
-    _replay: Any = staticmethod(_replay)
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
 
     def __init__(self, params: PremerlaniParams | None = None) -> None:
         super().__init__(STATE_DTYPE)

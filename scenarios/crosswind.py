@@ -40,13 +40,14 @@ SCENARIO = Scenario(
         manoeuvre={"height_m": 60.0},
     ),
     script=_script,
+    # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
         Check(
             "inclination error RMS",
             "deg",
             over(inclination_error_deg, rms, SETTLED),
-            4.0,
+            4.0,  # 2.1, 1.9 left
             pooled="rms",
             per_flight_limit=6.0,
         ),
@@ -54,7 +55,7 @@ SCENARIO = Scenario(
             "heading error RMS",
             "deg",
             over(heading_error_deg(), rms, SETTLED, judged_share=0.9),
-            3.0,
+            3.0,  # 1.5, 1.5 left
             pooled="rms",
             per_flight_limit=4.5,
         ),

@@ -49,15 +49,16 @@ SCENARIO = Scenario(
         manoeuvre={"height_m": 30.0},
     ),
     script=_script,
+    # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
-        Check("height at 20 s", "m", height_at_m(JUDGED_S), 10.0, ">="),
-        Check("lowest height", "m", over(height_m, lowest, start, at(JUDGED_S)), 1.5, ">="),
+        Check("height at 20 s", "m", height_at_m(JUDGED_S), 10.0, ">="),  # 27.9, 17.9 left
+        Check("lowest height", "m", over(height_m, lowest, start, at(JUDGED_S)), 1.5, ">="),  # 2.04, 0.54 left
         Check(
             "inclination error RMS",
             "deg",
             over(inclination_error_deg, rms, start, at(JUDGED_S)),
-            4.0,
+            4.0,  # 3.2, 0.8 left
             pooled="rms",
             per_flight_limit=6.0,
         ),
@@ -65,7 +66,7 @@ SCENARIO = Scenario(
             "heading within 15 deg for good",
             "s",
             settling(heading_error_deg(), 15.0, start, at(JUDGED_S)),
-            JUDGED_S,
+            JUDGED_S,  # 3.6, 16.4 left
         ),
     ),
 )

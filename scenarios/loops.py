@@ -44,14 +44,15 @@ SCENARIO = Scenario(
         manoeuvre={"height_m": 100.0, "first_s": 25.0, "pitch_rate_deg_s": 110.0},
     ),
     script=_script,
+    # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
-        Check("loops flown", "turns", most_loops, turns_that_count(LOOPS), ">="),
+        Check("loops flown", "turns", most_loops, turns_that_count(LOOPS), ">="),  # 3.01, 0.06 left
         Check(
             "inclination error RMS",
             "deg",
             over(inclination_error_deg, rms, after(LOOPED, 10.0), after(LOOPED, 30.0)),
-            5.0,
+            5.0,  # 3.0, 2.0 left
             pooled="rms",
             per_flight_limit=7.5,
         ),

@@ -51,13 +51,14 @@ SCENARIO = Scenario(
         manoeuvre={"height_m": 80.0, "bank_deg": 35.0, "first_s": 25.0, "every_s": 45.0},
     ),
     script=_script,
+    # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
         Check(
             "inclination error RMS",
             "deg",
             over(inclination_error_deg, rms, SETTLED),
-            5.0,
+            5.0,  # 4.0, 1.0 left
             pooled="rms",
             per_flight_limit=7.5,
         ),
@@ -65,7 +66,7 @@ SCENARIO = Scenario(
             "heading below 10 deg after roll-out",
             "s",
             slowest_recovery(heading_error_deg(), RECOVERED_DEG, TURNS, RECOVERED_S),
-            RECOVERED_S,
+            RECOVERED_S,  # 1.6, 8.4 left
         ),
     ),
     milestones={"rolled out": lambda flight: [r.t_s for r in roll_outs(flight)]},

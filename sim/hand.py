@@ -39,7 +39,7 @@ def sway(start: HandThrow, t_s: float) -> tuple[tuple[float, float, float], tupl
         rates[i] = start.sway_rad_s[i] * math.sin(phase)
     roll, pitch, yaw = angles
     dr, dp, dy = rates
-    # Body rates from Euler rates (Etkin & Reid, Eqn 4.4,7).
+    # Body rates from Euler rates (Etkin & Reid, section 4.4).
     p = dr - dy * math.sin(pitch)
     q = dp * math.cos(roll) + dy * math.cos(pitch) * math.sin(roll)
     r = -dp * math.sin(roll) + dy * math.cos(pitch) * math.cos(roll)

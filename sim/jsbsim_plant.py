@@ -26,7 +26,7 @@ from sim.log import Log, Outcome, Phase
 from sim.plant import HandThrow, InFlight, Start
 from sim.rng import stream
 from sim.trim import Trim, trim
-from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
+from sim.truth import EARTH_RATE_RAD_S, earth_rate_e_rad_s, gravity_m_s2, integrate_imu
 
 FT_TO_M = 0.3048
 LB_TO_N = 4.4482216152605
@@ -37,7 +37,7 @@ SLUGFT2_TO_KGM2 = SLUG_TO_KG * FT_TO_M**2
 AIRCRAFT = Path(__file__).parent / "aircraft"
 LATITUDE_DEG, LONGITUDE_DEG = 42.80, -73.95  # the launch point, at sea level
 
-# What is read after each tick: field of the staging record, its JSBSim properties.
+# What is read after each tick: field of the state record, its JSBSim properties.
 READ: dict[str, tuple[str, ...]] = {
     "euler_rad": ("attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad"),
     "omega_b_rad_s": ("velocities/pi-rad_sec", "velocities/qi-rad_sec", "velocities/ri-rad_sec"),
@@ -46,9 +46,8 @@ READ: dict[str, tuple[str, ...]] = {
     "wind_e_fps": tuple(f"atmosphere/total-wind-{d}-fps" for d in ("north", "east", "down")),
     "surfaces": ("servo/aileron", "servo/elevator", "servo/rudder", "fcs/throttle-pos-norm"),
     "motor": ("propulsion/engine/propeller-rpm", "propulsion/engine/thrust-lbs"),
-    "contact": ("gear/wow",),
+    "contact": ("forces/fbz-gear-lbs",),
 }
-READ_DTYPE = np.dtype([(name, "f8", (len(properties),)) for name, properties in READ.items()], align=True)
 WRITE = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
 INTEGRATORS = tuple(f"simulation/integrator/{a}" for a in (
     "rate/rotational", "rate/translational", "position/rotational", "position/translational",
@@ -56,6 +55,7 @@ INTEGRATORS = tuple(f"simulation/integrator/{a}" for a in (
 
 STATE_DTYPE = np.dtype(
     [
+        *((name, "f8", (len(properties),)) for name, properties in READ.items()),  # packed into its first bytes
         ("R_eb", "f8", (3, 3)),  # at the end of the previous tick
         ("v_e_m_s", "f8", (3,)),
         ("origin_e_m", "f8", (3,)),  # where the start is, from the launch point
@@ -86,9 +86,12 @@ class _Silent(jsbsim.FGLogger):
         return
 
 
+_SILENT = _Silent()
+
+
 @kernel
 def rotation_of(roll_rad, pitch_rad, yaw_rad, R_eb):  # type: ignore[no-untyped-def]
-    """Write into `R_eb` the body-to-earth rotation of the Euler angles (Etkin & Reid, Eqn 4.4,3, transposed)."""
+    """Write into `R_eb` the body-to-earth rotation of the Euler angles (Etkin & Reid, section 4.4)."""
     cr, sr = np.cos(roll_rad), np.sin(roll_rad)
     cp, sp = np.cos(pitch_rad), np.sin(pitch_rad)
     cy, sy = np.cos(yaw_rad), np.sin(yaw_rad)
@@ -119,26 +122,26 @@ def complete(truth, k, state):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def observe(read, truth, k, state):  # type: ignore[no-untyped-def]
+def observe(truth, k, state):  # type: ignore[no-untyped-def]
     """Turn what JSBSim reports into truth row k, in SI; return the index of the outcome in OUTCOMES, 0 to fly on."""
-    row, s, r = truth[k], state[0], read[0]
-    rotation_of(r.euler_rad[0], r.euler_rad[1], r.euler_rad[2], row.R_eb)
+    row, s = truth[k], state[0]
+    rotation_of(s.euler_rad[0], s.euler_rad[1], s.euler_rad[2], row.R_eb)
     rate2 = speed2 = 0.0
     for i in range(3):
-        row.omega_b_rad_s[i] = r.omega_b_rad_s[i]
-        row.v_e_m_s[i] = FT_TO_M * r.v_e_fps[i]
-        row.wind_e_m_s[i] = FT_TO_M * r.wind_e_fps[i]
-        row.p_e_m[i] = s.origin_e_m[i] + FT_TO_M * r.p_neu_ft[i] * (1.0 if i < 2 else -1.0)
+        row.omega_b_rad_s[i] = s.omega_b_rad_s[i]
+        row.v_e_m_s[i] = FT_TO_M * s.v_e_fps[i]
+        row.wind_e_m_s[i] = FT_TO_M * s.wind_e_fps[i]
+        row.p_e_m[i] = s.origin_e_m[i] + FT_TO_M * s.p_neu_ft[i] * (1.0 if i < 2 else -1.0)
         rate2 += row.omega_b_rad_s[i] ** 2
         speed2 += row.v_e_m_s[i] ** 2
-    row.aileron, row.elevator, row.rudder, row.throttle = r.surfaces[0], r.surfaces[1], r.surfaces[2], r.surfaces[3]
+    row.aileron, row.elevator, row.rudder, row.throttle = s.surfaces[0], s.surfaces[1], s.surfaces[2], s.surfaces[3]
     row.phase = 2  # flying
-    row.rotor_rpm, row.thrust_n = r.motor[0], LB_TO_N * r.motor[1]
+    row.rotor_rpm, row.thrust_n = s.motor[0], LB_TO_N * s.motor[1]
     complete(truth, k, state)
     n, e, d = row.p_e_m[0], row.p_e_m[1], row.p_e_m[2]
-    if not (rate2 < 1e4 and speed2 < 4e4 and abs(d) < 1e6 and abs(r.euler_rad[0]) < 10.0):  # NaN fails too
+    if not (rate2 < 1e4 and speed2 < 4e4 and abs(d) < 1e6 and abs(s.euler_rad[0]) < 10.0):  # NaN fails too
         return 3
-    if r.contact[0] != 0.0:
+    if s.contact[0] != 0.0:
         return 1
     if n * n + e * e > s.box_radius_m**2 or -d > s.box_height_m:
         return 2
@@ -155,8 +158,7 @@ class Model:
             raise ValueError(f"unknown aircraft '{aircraft}': choose {', '.join(known)}")
         self.airframe: dict[str, Any] = tomllib.loads((self.folder / "airframe.toml").read_text())
         self.dt_s = 1.0 / physics_hz
-        self._logger = _Silent()  # kept alive: JSBSim holds no reference of its own
-        jsbsim.set_logger(self._logger)
+        jsbsim.set_logger(_SILENT)  # anew for each model: JSBSim keeps a logger per thread
         self.fdm = jsbsim.FGFDMExec(None)
         self.fdm.set_dt(self.dt_s)  # before the model: the servos' lags are worked out while loading
         if not self.fdm.load_model_with_paths(aircraft, str(AIRCRAFT), str(self.folder), str(self.folder)):
@@ -217,7 +219,10 @@ class Model:
 
         Then the motion is frozen for `settle` steps (at least 1), in which the propeller finds its speed.
         """
-        self.put({"ic/lat-geod-deg": LATITUDE_DEG, "ic/long-gc-deg": LONGITUDE_DEG, "ic/terrain-elevation-ft": 0.0})
+        # The frozen motion is at rest in inertial space: the earth turns on below it, to the launch point.
+        ahead_deg = math.degrees(EARTH_RATE_RAD_S * settle * self.dt_s)
+        self.put({"ic/lat-geod-deg": LATITUDE_DEG, "ic/long-gc-deg": LONGITUDE_DEG + ahead_deg})
+        self.put({"ic/terrain-elevation-ft": 0.0})
         self.put({"ic/h-agl-ft": height_m / FT_TO_M})
         self.put(dict(zip(("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"), euler_rad, strict=True)))
         self.put({f"ic/{a}-fps": float(v) / FT_TO_M for a, v in zip("uvw", v_b_m_s, strict=True)})
@@ -289,10 +294,9 @@ class JsbsimPlant:
     ) -> None:  # fmt: skip
         rates = rates or Rates()
         box = box or FlightBox()
-        self.model = Model(aircraft, rates.physics_hz)
-        self.airframe = self.model.airframe
         self.start, self.air = start, air
         self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
+        self._physics_hz, self._aircraft = rates.physics_hz, aircraft
         # JSBSim keeps the seed in a 32-bit signed integer.
         self._turbulence_seed = int(stream(seed, flight, "turbulence").integers(1, 2**31 - 1))
         self._hold_ticks = self._release_tick = self._hand_ticks = 0
@@ -302,22 +306,33 @@ class JsbsimPlant:
             self._release_tick = self._hold_ticks + max(1, rates.ticks(start.push_s))
             self._hand_ticks = self._release_tick + 1  # the first tick of the flight puts its integrator away
         self.release_s = self._release_tick * self.dt_s
-        self._read = np.zeros(1, READ_DTYPE)
-        self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
-        self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
-        self._pack = Struct(f"{len(self._getters)}d").pack_into
-        self._buffer = self._read.data
+        self._load()
+        self.airframe = self.model.airframe
+        self.trimmed = Trim.of(self.airframe["cruise"])
+        if isinstance(start, InFlight):
+            if not (math.isfinite(start.heading_rad) and 0.0 < start.height_m < 10_000.0):
+                raise ValueError(
+                    f"height_m {start.height_m} m: must be above 0 and below 10000 m, with a finite heading"
+                )
+            airspeed_m_s = self.trimmed.airspeed_m_s if start.airspeed_m_s is None else start.airspeed_m_s
+            self.trimmed = trim(self.model, airspeed_m_s, start.height_m)
         self._state = np.zeros(1, STATE_DTYPE)
+        self._buffer = self._state.data
         latitude_rad = math.radians(LATITUDE_DEG)
         s = self._state[0]
         s["earth_rate_e"], s["g_m_s2"] = earth_rate_e_rad_s(latitude_rad), gravity_m_s2(latitude_rad)
         s["dt_s"], s["box_radius_m"], s["box_height_m"] = self.dt_s, box.radius_m, box.height_m
-        self._trim = Trim.of(self.airframe["cruise"])
-        if isinstance(start, InFlight) and start.airspeed_m_s not in (None, self._trim.airspeed_m_s):
-            self._trim = trim(self.model, start.airspeed_m_s, start.height_m)
+
+    def _load(self) -> None:
+        """A JSBSim of its own for each flight: its turbulence filters and blown-up states outlive any reset."""
+        self.model = Model(self._aircraft, self._physics_hz)
+        self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
+        self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._pack = Struct(f"{len(self._getters)}d").pack_into
 
     def reset(self, log: Log) -> None:
         """Put the aeroplane at its start; the rows of `log` are filled from tick 0 on."""
+        self._load()
         self._truth = log.truth
         s = self._state[0]
         if isinstance(self.start, HandThrow):
@@ -328,7 +343,7 @@ class JsbsimPlant:
 
     def _start_in_flight(self, start: InFlight) -> None:
         """Trimmed, level relative to the moving air, heading as asked; servos and propeller as in the trim."""
-        t = self._trim
+        t = self.trimmed
         euler_rad = (0.0, t.alpha_rad, start.heading_rad)
         R_eb = np.empty((3, 3))
         rotation_of(*euler_rad, R_eb)
@@ -352,9 +367,13 @@ class JsbsimPlant:
         s["v_e_m_s"] = s["R_eb"] @ v_b_m_s
         settle = max(1, round(settle_s / self.model.dt_s))
         self.model.place(-p_e_m[2], euler_rad, v_b_m_s, omega_b_rad_s, command, self.air, settle)
-        n, e, u = FT_TO_M * self.model.get(*READ["p_neu_ft"])
-        s["origin_e_m"] = np.array(p_e_m) - np.array([n, e, -u])
+        self._anchor(p_e_m)
         self.model.stir(self.air, self._turbulence_seed)
+
+    def _anchor(self, p_e_m: tuple[float, float, float]) -> None:
+        """Let the place where JSBSim now is be `p_e_m`."""
+        n, e, u = FT_TO_M * self.model.get(*READ["p_neu_ft"])
+        self._state[0]["origin_e_m"] = np.array(p_e_m) - np.array([n, e, -u])
 
     def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
         """Fly tick `k` under `command` and fill truth row k; an Outcome where the flight ended in it."""
@@ -374,7 +393,7 @@ class JsbsimPlant:
 
     def _observe(self, k: int) -> Outcome | None:
         self._pack(self._buffer, 0, *[read() for read in self._getters])
-        return OUTCOMES[observe(self._read, self._truth, k, self._state)]
+        return OUTCOMES[observe(self._truth, k, self._state)]
 
     def run_bare(self, n_ticks: int) -> None:
         """The physics of `n_ticks` and nothing else, commands as they are: what a benchmark compares with."""
@@ -431,6 +450,7 @@ class JsbsimPlant:
         self._set_hand(np.zeros(3), np.zeros(3))
         self._push(start, 1.0 / ((self._release_tick - self._hold_ticks) * self.steps))
         self.model.frozen(1)
+        self._anchor((0.0, 0.0, -start.height_m))
         self.model.remember(False)
 
     def _push(self, start: HandThrow, part: float) -> None:

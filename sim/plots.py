@@ -89,10 +89,13 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
         inclination_error_rad(flown["R_eb"], truth["R_eb"]),
     )
     fixed = measured["gps_valid"] > 0
+    # A flight to the north is shown from -180 to 180, one to the south from 0 to 360: fewer leaps.
+    cut_rad = -np.pi if np.mean(truth["R_eb"][:, 0, 0]) > 0.0 else 0.0
+    bank_rad = flown["bank_demand_rad"], true_rad[0], estimated_rad[0]
     columns: dict[str, tuple[Any, ...]] = {
-        "attitude/bank": tuple(_circle_deg(a) for a in (flown["bank_demand_rad"], true_rad[0], estimated_rad[0])),
+        "attitude/bank": tuple(_circle_deg(a, -np.pi) for a in bank_rad),
         "attitude/pitch": tuple(np.degrees(a) for a in (flown["pitch_demand_rad"], true_rad[1], estimated_rad[1])),
-        "attitude/heading": tuple(_circle_deg(a % (2.0 * np.pi)) for a in (course_rad, true_rad[2], estimated_rad[2])),
+        "attitude/heading": tuple(_circle_deg(a, cut_rad) for a in (course_rad, true_rad[2], estimated_rad[2])),
         "attitude/error": tuple(np.degrees(a) for a in errors_rad),
         "flight/height": (np.where(fixed, -measured["gps_p_e_m"][:, 2], np.nan), -truth["p_e_m"][:, 2]),
         "flight/speed": (np.where(fixed, measured["gps_speed_m_s"], np.nan), ground_m_s, truth["airspeed_m_s"]),
@@ -110,8 +113,8 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
     return {path: np.column_stack(lines) for path, lines in columns.items()}
 
 
-def _circle_deg(angle_rad: Array) -> Array:
-    """Degrees, with a gap where the angle leaps round the circle (no aeroplane turns 90 degrees in a tick)."""
-    angle_deg = np.degrees(angle_rad)
+def _circle_deg(angle_rad: Array, cut_rad: float) -> Array:
+    """Degrees from the cut once round, with a gap at every leap (no aeroplane turns 90 degrees in a tick)."""
+    angle_deg = np.degrees((angle_rad - cut_rad) % (2.0 * np.pi) + cut_rad)
     angle_deg[1:][np.abs(np.diff(angle_deg)) > 90.0] = np.nan
     return angle_deg

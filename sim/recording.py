@@ -24,8 +24,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from estimator.interface import Column
@@ -43,12 +43,12 @@ class RecordingError(ValueError):
 
 
 class Element(NamedTuple):
-    """One Parquet column: `index` of `column` in `table`, under the name it has in the file."""
+    """One Parquet column: the element `at` of `column` in `table`, under the name it has in the file."""
 
     name: str
     table: str
     column: Column
-    index: tuple[int, ...]
+    at: tuple[int, ...]
 
 
 def elements() -> tuple[Element, ...]:
@@ -207,13 +207,13 @@ def plain(value: Any) -> Any:
 
 def _columns(log: Log) -> Iterator[tuple[str, NDArray[Any]]]:
     for e in elements():
-        yield e.name, np.ascontiguousarray(getattr(log, e.table)[e.column.name][(slice(None), *e.index)])
+        yield e.name, np.ascontiguousarray(getattr(log, e.table)[e.column.name][(slice(None), *e.at)])
 
 
 def _table(log: Log, record: dict[str, Any]) -> pa.Table:
     fields, arrays = [], []
     for e, (name, values) in zip(elements(), _columns(log), strict=True):
-        about = {"meaning": e.column.meaning, "shape": json.dumps(e.column.shape), "index": json.dumps(e.index)}
+        about = {"meaning": e.column.meaning, "shape": json.dumps(e.column.shape), "index": json.dumps(e.at)}
         arrays.append(pa.array(values))
         fields.append(pa.field(name, arrays[-1].type, nullable=False, metadata=about))
     return pa.table(arrays, schema=pa.schema(fields, metadata={_KEY: json.dumps(record, allow_nan=False)}))
@@ -253,7 +253,7 @@ def _log_of(table: pa.Table, path: Path) -> Log:
         raise RecordingError(f"{path} was recorded by another version: it {kind} column {odd[0]}")
     log = Log.empty(table.num_rows)
     for e in elements():
-        getattr(log, e.table)[e.column.name][(slice(None), *e.index)] = table[e.name].to_numpy()
+        getattr(log, e.table)[e.column.name][(slice(None), *e.at)] = table[e.name].to_numpy()
     return log
 
 

@@ -1,34 +1,33 @@
 """A flight to look at: the Rerun recording of truth beside estimate, and the viewer that shows it.
 
 `write` makes a ``.rrd`` in bulk after the flight, with the layout of the viewer inside; `LiveView` streams the same
-in blocks while flying; `open_viewer` shows a file.  Times are seconds since the release, negative before it.  No
+in blocks while flying.  Times are seconds since the release, negative before it.  No
 wall clock goes into a recording: the same flight gives the same data.
 
 The estimated aeroplane is drawn at the true position, so that what one sees between the two is attitude error
 alone.  The chase view follows the path, not the nose: its horizon stays level, and bank and pitch are seen.
 """
 
-import os
-import socket
-import subprocess
-import sys
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pymap3d
-from scipy.spatial.transform import Rotation
+import pymap3d  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
 from autopilot.interface import Mode
 from estimator.interface import Array, HeadingReference, Health
 from estimator.rotation import from_euler
 from sim.log import Event, Flight, Log, Phase
 from sim.mesh import Mesh, aeroplane, geometry_of
-from sim.plots import DEMAND, ESTIMATE, PAGES, PLOTS, TRUTH, Colour, curves
-from sim.recording import RecordingError, digest, replacing
+from sim.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, curves
+from sim.recording import digest, replacing
+from sim.story import setting, story
+from sim.viewer import Viewer as Viewer
+from sim.viewer import open_viewer as open_viewer
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -41,10 +40,15 @@ _SKY: Colour = (30, 38, 50)
 _GROUND: Colour = (40, 50, 46)
 _GRID: Colour = (78, 94, 88)
 _WIND: Colour = (120, 220, 230)
-_LARGE = 14.0  # the overview shows the aeroplane so many times too large, or nobody would find it
-_TRACK_HZ = 10.0  # the drawn tracks
+_LARGE = 0.05  # the overview shows the aeroplane larger, by this times the reach in metres, or nobody would find it
+_WIDTHS = (2.4, 1.7, 1.2)  # of the lines of a plot: a lower one is seen beside those that cover it
+_TRACK_HZ = 25.0  # the drawn tracks
 _CHASE_S = 1.5  # the chase view follows the path smoothed over about so long
 _LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
+_LANE_COLOURS: dict[str, dict[str, Colour]] = {
+    "phase": {"held": (90, 95, 105), "thrown": (190, 140, 50), "flying": (45, 110, 125)},
+    "estimator": {"starting": (90, 95, 105), "good": (50, 125, 80), "poor": (180, 60, 60)},
+}
 
 
 def write(flight: Flight, path: str | Path) -> Path:
@@ -96,72 +100,6 @@ class LiveView:
 
 
 @dataclass(frozen=True, slots=True)
-class Viewer:
-    """A viewer process that was started.
-
-    process : of the viewer, which outlives us     url : its gRPC server, for `LiveView`
-    address : to be opened in a browser; None where a window opened by itself
-    """
-
-    process: subprocess.Popen[bytes]
-    url: str
-    address: str | None
-
-
-def open_viewer(path: str | Path | None = None, *, web: bool = False) -> Viewer:
-    """Start Rerun's viewer on the recording at `path`, or empty for a live flight; on the loopback address only.
-
-    web : serve it to a browser instead of opening a window, as one must where there is no display
-
-    Raises
-    ------
-    RecordingError    no file there, no display to open a window on, or a viewer that does not start
-    """
-    if path is not None and not Path(path).is_file():
-        raise RecordingError(f"no Rerun recording at {path}: there is no such file")
-    if not web and not _has_display():
-        raise RecordingError("no display here to open a window on: add --web to serve the recording to a browser")
-    grpc_port, web_port = _free_port(), _free_port()
-    url = f"rerun+http://127.0.0.1:{grpc_port}/proxy"
-    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(grpc_port)]
-    command += ["--serve-web", "--web-viewer-port", str(web_port)] if web else ["--expect-data-soon"]
-    command += [] if path is None else [str(path)]
-    process = subprocess.Popen(
-        command,
-        env={**os.environ, "RERUN_ANALYTICS": "0"},
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )  # fmt: skip
-    _await_port(process, grpc_port)
-    address = f"http://127.0.0.1:{web_port}/?url={url.replace('+', '%2B')}" if web else None
-    return Viewer(process, url, address)
-
-
-def _has_display() -> bool:
-    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def _free_port() -> int:
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return int(s.getsockname()[1])
-
-
-def _await_port(process: subprocess.Popen[bytes], port: int, within_s: float = 20.0) -> None:
-    end = time.monotonic() + within_s
-    while time.monotonic() < end:
-        if process.poll() is not None:
-            raise RecordingError(f"the Rerun viewer did not start: it ended with code {process.returncode}")
-        with socket.socket() as s:
-            s.settimeout(0.5)
-            if s.connect_ex(("127.0.0.1", port)) == 0:
-                return
-        time.sleep(0.05)
-    process.terminate()
-    raise RecordingError(f"the Rerun viewer did not start: nothing listens on 127.0.0.1:{port} after {within_s:g} s")
-
-
-@dataclass(frozen=True, slots=True)
 class Scene:
     """What is drawn and where, beside the rows of the log.
 
@@ -190,12 +128,6 @@ class Scene:
         """Latitude and longitude, shape (n, 2), of positions from the launch point, shape (n, 3) (WGS 84)."""
         latitude, longitude, _ = pymap3d.ned2geodetic(*p_e_m.T, *self.place, 0.0)
         return np.column_stack((latitude, longitude))
-
-
-def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> Any:
-    """Entry `name` of the manifest, or of the resolved configuration in it."""
-    value = manifest.get(name, (manifest.get("configuration") or {}).get(name))
-    return otherwise if value is None else value
 
 
 def _stream(manifest: Mapping[str, Any], recording_id: str | None) -> "rr.RecordingStream":
@@ -229,16 +161,19 @@ def _send_fixed(rec: "rr.RecordingStream", scene: Scene) -> None:
     rec.log("world/launch", launch, static=True)
     home = rr.GeoPoints(lat_lon=[scene.place], radii=rr.Radius.ui_points(5.0), colors=(255, 255, 255))
     rec.log("map/launch", home, static=True)
+    for lane, colours in _LANE_COLOURS.items():
+        words = list(colours)
+        style = rr.StateConfiguration(values=words, labels=words, colors=list(colours.values()))
+        rec.log(f"states/{lane}", style, static=True)
     for name, mesh in scene.parts.items():
         for body, colour, alpha in (("truth", TRUTH, 255), ("estimate", ESTIMATE, 110)):
             shape = _painted(mesh, name, colour, alpha)
             rec.log(f"world/{body}/body/{name}", shape, static=True)
         rec.log(f"world/truth/body/large/{name}", _painted(mesh, name, TRUTH, 255), static=True)
-    rec.log("world/truth/body/large", rr.Transform3D(scale=_LARGE), static=True)
     for plot in PLOTS:
         lines = rr.SeriesLines(
             names=[c.name for c in plot.curves], colors=[c.colour for c in plot.curves],
-            widths=[1.0 if c.colour == DEMAND else 1.6 for c in plot.curves],
+            widths=_WIDTHS[: len(plot.curves)],
         )  # fmt: skip
         rec.log(f"plots/{plot.path}", lines, static=True)
 
@@ -253,11 +188,10 @@ def _painted(mesh: Mesh, name: str, colour: Colour, alpha: int) -> "rr.Mesh3D":
     elif name == "fuselage":
         base = 0.35 * base + 0.65 * 235.0
     below = np.clip(mesh.normals[:, 2:], 0.0, 1.0) if name != "propeller" else 0.0
-    rgb = base * (1.0 - 0.65 * below)
-    rgba = np.column_stack((np.broadcast_to(rgb, mesh.vertices.shape), np.full(len(mesh.vertices), alpha)))
+    rgb = np.broadcast_to(base * (1.0 - 0.65 * below), mesh.vertices.shape)
     return rr.Mesh3D(
         vertex_positions=mesh.vertices, triangle_indices=mesh.triangles, vertex_normals=mesh.normals,
-        vertex_colors=rgba.astype(np.uint8), albedo_factor=(255, 255, 255, alpha),
+        vertex_colors=rgb.astype(np.uint8), albedo_factor=(255, 255, 255, alpha),
     )  # fmt: skip
 
 
@@ -272,7 +206,7 @@ def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int) ->
     p_e_m = log.truth["p_e_m"]
 
     def when(rows: Any) -> list[rr.TimeColumn]:
-        return [rr.TimeColumn(TIMELINE, duration=t_s[rows])]
+        return [rr.TimeColumn(TIMELINE, duration=_ns(t_s[rows]))]
 
     poses = {
         "world/truth/body": log.truth["R_eb"],
@@ -300,6 +234,11 @@ def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int) ->
     _send_tracks(rec, scene, log, here)
 
 
+def _ns(t_s: Array) -> NDArray[np.timedelta64]:
+    """Seconds as whole nanoseconds, rounded, where Rerun would cut off."""
+    return np.round(t_s * 1e9).astype("timedelta64[ns]")
+
+
 def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array) -> None:
     """The way so far: truth, its shadow on the ground, the GPS fixes; and the mean wind at the launch point."""
     import rerun as rr
@@ -312,6 +251,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
     rec.log("world/truth/shadow", rr.LineStrips3D([shadow], colors=(0, 0, 0, 120), radii=thin), static=True)
     on_map = rr.GeoLineStrings(lat_lon=[here[::every]], colors=TRUTH, radii=rr.Radius.ui_points(2.0))
     rec.log("map/truth", on_map, static=True)
+    rec.log("world/truth/body/large", rr.Transform3D(scale=_LARGE * _extent(log)[1]), static=True)
     fixes = log.measured["gps_p_e_m"][log.measured["gps_new"] > 0]
     if len(fixes):
         rec.log("world/gps", rr.Points3D(fixes, colors=ESTIMATE, radii=rr.Radius.ui_points(1.5)), static=True)
@@ -345,33 +285,10 @@ def _send_end(rec: "rr.RecordingStream", flight: Flight) -> None:
 
     events: Sequence[Event] = flight.events
     if events:
-        when = [rr.TimeColumn(TIMELINE, duration=[e.t_s - flight.release_s for e in events])]
+        when = [rr.TimeColumn(TIMELINE, duration=_ns(np.array([e.t_s for e in events]) - flight.release_s))]
         columns = rr.TextLog.columns(text=[e.text for e in events], level=[e.level.upper() for e in events])
         rec.send_columns("events", when, columns)
     rec.log("story", rr.TextDocument(story(flight), media_type=rr.MediaType.MARKDOWN), static=True)
-
-
-def story(flight: Flight) -> str:
-    """What was flown and how it went, as Markdown."""
-    told = {name: setting(flight.manifest, name) for name in ("aircraft", "estimator", "autopilot", "seed", "wind")}
-    end_s = float(flight.log.truth["t_s"][-1]) - flight.release_s if len(flight.log) else 0.0
-    told["heading is judged against"] = f"the true {flight.heading_reference}"
-    how = flight.outcome.replace("_", " ") + (f": {flight.message}" if flight.message else "")
-    told["outcome"] = f"{how}, {end_s:.1f} s after the release"
-    lines = [f"# {setting(flight.manifest, 'scenario', 'Flight')}", ""]
-    lines += [f"- {name}: **{value}**" for name, value in told.items() if value is not None]
-    verdict = flight.manifest.get("verdict") or ()
-    if verdict:
-        lines += ["", "## Verdict", "", "| check | measured | limit | |", "|-|-:|-:|-|"]
-        for row in verdict:
-            measured, limit = (_figure(row.get(key), row.get("unit", "")) for key in ("measured", "limit"))
-            lines.append(f"| {row['check']} | {measured} | {limit} | {'passed' if row['passed'] else '**FAILED**'} |")
-    lines += ["", "Orange is the truth, blue the estimate, green a sensor, grey a demand."]
-    return "\n".join(lines)
-
-
-def _figure(value: Any, unit: str) -> str:
-    return f"{value:.3g} {unit}".strip() if isinstance(value, int | float) else "none"
 
 
 def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
@@ -384,34 +301,24 @@ def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
     up = (0.0, 0.0, -1.0)
     sky = rrb.Background(color=_SKY)
     chase = rrb.Spatial3DView(
-        origin="/world/chase", contents=["+ /world/**", "- /world/truth/body/large/**", "- /world/launch", "- /world/gps"],
+        origin="/world/chase",
+        contents=["+ /world/**", "- /world/truth/body/large/**", "- /world/launch", "- /world/gps", "- /world/wind"],
         name="Chase: orange truth, blue estimate", background=sky, line_grid=False,
-        eye_controls=rrb.EyeControls3D(position=(-2.3, -0.9, -1.25), look_target=(0.0, 0.0, 0.0), eye_up=up),
+        eye_controls=rrb.EyeControls3D(position=(-2.0, -0.3, -0.95), look_target=(0.0, 0.0, 0.0), eye_up=up),
     )  # fmt: skip
     centre, reach = _extent(log)
     overview = rrb.Spatial3DView(
         origin="/world", contents=["+ /world/**", "- /world/estimate/body/**"],
         name="The whole flight", background=sky, line_grid=False,
         eye_controls=rrb.EyeControls3D(
-            position=centre + reach * np.array([-0.55, -0.2, -0.45]), look_target=centre, eye_up=up
+            position=centre + reach * np.array([-0.7, -0.42, -0.58]), look_target=centre, eye_up=up
         ),
     )  # fmt: skip
     degrees_wide = 1.6 * reach / 111_320.0
     on_map = rrb.MapView(origin="/map", name="Map", zoom=float(np.log2(360.0 / degrees_wide) + 0.3))
-    axis = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal, view_range=_span(log, release_s))
-    pages = [
-        rrb.Vertical(
-            *(
-                rrb.TimeSeriesView(
-                    origin=f"/plots/{plot.path}", name=plot.title, axis_x=axis,
-                    plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0 or plot.curves != plots[k - 1].curves),
-                )
-                for k, plot in enumerate(plots)
-            ),
-            name=page,
-        )
-        for page, plots in PAGES.items()
-    ]  # fmt: skip
+    span = _span(log, release_s)
+    axis = rrb.TimeAxis(view_range=span) if span else None
+    pages = [rrb.Vertical(*_page(plots, axis), name=name) for name, plots in PAGES.items()]
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(chase, rrb.Horizontal(overview, on_map, column_shares=[3, 2]), row_shares=[3, 2]),
@@ -423,7 +330,7 @@ def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
                     rrb.TextLogView(origin="/events", name="Events"),
                     active_tab=0,
                 ),
-                row_shares=[7.2, 2.2, 2.6],
+                row_shares=[6.6, 2.1, 3.3],
             ),
             column_shares=[9, 8],
         ),
@@ -434,6 +341,17 @@ def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
         auto_layout=False,
         auto_views=False,
     )
+
+
+def _page(plots: Sequence[Plot], axis: "rrb.TimeAxis | None") -> "Iterator[rrb.TimeSeriesView]":
+    """The plots of a page below one another; a legend where it differs from the one above."""
+    import rerun.blueprint as rrb
+
+    above: tuple[Curve, ...] = ()
+    for plot in plots:
+        legend = rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=plot.curves != above)
+        yield rrb.TimeSeriesView(origin=f"/plots/{plot.path}", name=plot.title, axis_x=axis, plot_legend=legend)
+        above = plot.curves
 
 
 def _extent(log: Log | None) -> tuple[Array, float]:

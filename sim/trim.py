@@ -67,6 +67,6 @@ def trim(model: "Model", airspeed_m_s: float, height_m: float = 60.0) -> Trim:
     flyable = max(abs(elevator), abs(aileron)) <= 1.0 and 0.0 <= throttle <= 1.0 and abs(alpha) < 0.3
     if not (np.max(np.abs(found.fun)) < 1e-6 and flyable):
         raise ValueError(
-            f"airspeed_m_s {airspeed_m_s} m/s: no level trim at {height_m:g} m, choose a speed between stall and top speed"
+            f"airspeed_m_s {airspeed_m_s} m/s: no level trim at {height_m:g} m, choose one between stall and top speed"
         )
     return at(found.x)

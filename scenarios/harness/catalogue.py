@@ -15,10 +15,16 @@ def catalogue() -> dict[str, dict[str, str]]:
         "scenarios": {p.stem: _first_line(_tree(p)) for p in (_ROOT / "scenarios").glob("[!_]*.py")},
         "estimators": {name: _about(where) for name, where in plugins.estimators().items()},
         "autopilots": {name: _about(where) for name, where in plugins.autopilots().items()},
-        "aircraft": {p.name: _aircraft(p) for p in (_ROOT / "sim" / "aircraft").iterdir() if _is_aircraft(p)},
+        "aircraft": aircraft(),
         "sensor suites": dict(_suites(_tree(_ROOT / "sim" / "sensors" / "suite.py"))),
     }
     return {kind: dict(sorted(things.items())) for kind, things in found.items()}
+
+
+def aircraft() -> dict[str, str]:
+    """Names of the aircraft there are, with a line about each: every folder that holds the XML of its name."""
+    folders = (_ROOT / "sim" / "aircraft").iterdir()
+    return {p.name: _about_aircraft(p) for p in folders if (p / f"{p.name}.xml").is_file()}
 
 
 def _tree(path: Path) -> ast.Module:
@@ -39,11 +45,7 @@ def _about(where: str) -> str:
     return next((_first_line(node) for node in classes), where)
 
 
-def _is_aircraft(folder: Path) -> bool:
-    return (folder / f"{folder.name}.xml").is_file()
-
-
-def _aircraft(folder: Path) -> str:
+def _about_aircraft(folder: Path) -> str:
     package = folder / "__init__.py"
     return _first_line(_tree(package)) if package.is_file() else ""
 

@@ -65,7 +65,7 @@ class Check:
         measured = self.metric(flight)
         note = "" if measured.complete else f"{measured.samples} of {measured.expected} samples"
         passed = measured.complete and self._holds(measured.value, limit)
-        return Row(self.name, self.unit, measured.value, self.sense, limit, passed, note)
+        return Row(self.name, self.unit, float(measured.value), self.sense, limit, passed, note)
 
     def pool(self, rows: Sequence[Row]) -> Row:
         """The line of all flights, from the lines of each; a single flight is judged by its own limit."""
@@ -77,7 +77,7 @@ class Check:
             return Row(f"{self.name}: flights that pass", "flights", passing, ">=", len(rows), whole, note)
         value = self._pooled_value(np.array([row.measured for row in rows]))
         limit = rows[0].limit if len(rows) == 1 else self.limit
-        passed = bool(rows) and not short and self._holds(value, limit)
+        passed = len(rows) > 0 and not short and self._holds(value, limit)
         return Row(self.name, self.unit, value, self.sense, limit, passed, note)
 
     def _pooled_value(self, values: np.ndarray) -> float:
@@ -89,7 +89,7 @@ class Check:
 
     def _holds(self, value: float, limit: float) -> bool:
         """Written so that NaN fails."""
-        return value <= limit if self.sense == "<=" else value >= limit
+        return bool(value <= limit if self.sense == "<=" else value >= limit)
 
 
 SURVIVED = Check("survived", "", survived, 1.0, ">=", "count")

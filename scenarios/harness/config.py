@@ -85,7 +85,7 @@ class HandThrowStart(_Model):
 
     kind: Literal["hand_throw"] = "hand_throw"
     heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
-    pitch_deg: float = Field(default=10.0, ge=-30.0, le=60.0)
+    pitch_deg: float = Field(default=15.0, ge=-30.0, le=60.0)
     height_m: float = Field(default=1.7, gt=0.0, le=3.0)
     hold_s: float = Field(default=8.0, gt=0.0, le=600.0)
     push_m_s2: float = Field(default=27.0, gt=0.0, le=100.0)

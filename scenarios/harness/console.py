@@ -8,7 +8,6 @@ import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
@@ -20,13 +19,11 @@ if TYPE_CHECKING:
 WIDTH = 80
 
 
-@cache
 def err() -> "Console":
     """Standard error."""
     return _console(stderr=True)
 
 
-@cache
 def out() -> "Console":
     """Standard output."""
     return _console(stderr=False)
@@ -35,15 +32,23 @@ def out() -> "Console":
 def _console(stderr: bool) -> "Console":
     from rich.console import Console
 
-    console = Console(stderr=stderr, highlight=False, emoji=False, soft_wrap=False)
-    if not console.is_terminal and console.width < WIDTH:
-        console.width = WIDTH
+    console = Console(stderr=stderr, highlight=False, emoji=False)
+    if not console.is_terminal:
+        console.width = max(console.width, WIDTH)
     return console
 
 
 def error(message: str) -> None:
-    """One line on standard error: ``wingslevel: message``."""
-    print(f"wingslevel: {' '.join(message.split())}", file=sys.stderr)  # noqa: T201 - the one line must never be wrapped
+    """One line on standard error, never wrapped: ``wingslevel: message``."""
+    sys.stderr.write(f"wingslevel: {' '.join(message.split())}\n")
+
+
+def warn_if_cold() -> None:
+    """Say that the first flight of new sources compiles for a while."""
+    from estimator.jit import is_cold
+
+    if is_cold():
+        err().print("compiling the kernels, this once: about half a minute", style="dim")
 
 
 def number(value: float) -> str:
@@ -57,11 +62,13 @@ def verdict_table(title: str, rows: Sequence["Row"]) -> "Table":
     """The verdict on one flight, or on several pooled: check, measured, limit, unit, pass."""
     from rich.text import Text
 
-    grid = _table(title, ("check", "left"), ("measured", "right"), ("limit", "right"), ("unit", "left"), ("", "left"))
+    grid = _table(title, "check")
+    for heading, justify in (("measured", "right"), ("limit", "right"), ("unit", "left"), ("", "left")):
+        grid.add_column(heading, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for row in rows:
         word = Text("pass", "green") if row.passed else Text("FAIL", "bold red")
         name = Text(f"{row.name} ({row.note})" if row.note else row.name)
-        grid.add_row(name, number(row.measured), f"{row.sense} {number(row.limit)}", row.unit, word)
+        grid.add_row(name, number(row.measured), f"{row.sense} {number(row.limit)}", Text(row.unit), word)
     return grid
 
 
@@ -69,23 +76,32 @@ def name_table(title: str, lines: Mapping[str, str]) -> "Table":
     """Names with a line about each."""
     from rich.text import Text
 
-    grid = _table(title, ("name", "left"), ("", "left"))
+    grid = _table(title)
     grid.show_header = False
+    grid.add_column(no_wrap=True)
+    grid.add_column()
     for name, about in lines.items():
-        grid.add_row(name, Text(about, "dim"))
+        grid.add_row(Text(name), Text(about, "dim"))
     return grid
 
 
-def _table(title: str, *columns: tuple[str, str]) -> "Table":
-    """A plain table whose numbers never wrap: where it is narrow, the text of the first column does."""
+def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Table":
+    """Names with a number each, all in one unit."""
+    grid = _table(title, "")
+    grid.add_column(unit, justify="right", no_wrap=True)
+    for name, value in figures.items():
+        grid.add_row(name, number(value))
+    return grid
+
+
+def _table(title: str, *wrapping: str) -> "Table":
+    """A plain table; of its columns only the `wrapping` ones give way where it is narrow, never a number."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
 
-    grid = Table(box=box.SIMPLE_HEAD, title=Text(title), title_justify="left", title_style="bold", pad_edge=False)
-    for i, (heading, justify) in enumerate(columns):
-        wraps = i == len(columns) - 1 if not heading and justify == "left" and len(columns) == 2 else i == 0
-        grid.add_column(heading, justify=justify, no_wrap=not wraps)  # type: ignore[arg-type]
+    grid = Table(*wrapping, box=box.SIMPLE_HEAD, title=Text(title, "bold"), title_justify="left", pad_edge=False)
+    grid.title_style = ""
     return grid
 
 
@@ -98,8 +114,9 @@ class Advance(Protocol):
 @contextmanager
 def progress(what: str, unit: str) -> Iterator[Advance]:
     """A bar on standard error while the block runs; nothing where that is no terminal."""
-    if not err().is_terminal:
-        yield lambda done, total: None  # noqa: ARG005
+    console = err()
+    if not console.is_terminal:
+        yield lambda done, total: None  # noqa: ARG005 - the signature of Advance
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -109,6 +126,6 @@ def progress(what: str, unit: str) -> Iterator[Advance]:
         TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"),
         TimeElapsedColumn(),
     ]
-    with Progress(*columns, console=err(), transient=True) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(what, total=1.0)
         yield lambda done, total: bar.update(task, completed=done, total=total)

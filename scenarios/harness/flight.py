@@ -1,16 +1,14 @@
 """From a configuration to a flight: builds the aeroplane, its air, sensors, estimator and autopilot, and flies."""
 
-import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import is_dataclass, replace
 from typing import Any
 
-from autopilot.interface import Autopilot
 from estimator.interface import AttitudeEstimator
 from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, override, resolve
 from scenarios.harness.fitted import changed, suite_params
-from scenarios.harness.plugins import load_autopilot, load_estimator
+from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator
 from scenarios.harness.scenario import Scenario
 from sim.air import Air
 from sim.jsbsim_plant import JsbsimPlant
@@ -26,8 +24,8 @@ def fly_scenario(
     scenario: Scenario,
     overrides: Mapping[str, Any] | None = None,
     *,
-    seed: int = 0,
-    flight: int = 0,
+    seed: int | None = None,
+    flight: int | None = None,
     estimator: str | Maker | None = None,
     watch: Watch | None = None,
 ) -> Flight:
@@ -36,7 +34,7 @@ def fly_scenario(
     Parameters
     ----------
     overrides       fields of the configuration by dotted names, see `config.override`
-    seed, flight    name the random streams
+    seed, flight    name the random streams; None leaves those of the configuration
     estimator       name, ``module:Class``, ``file.py:Class`` or a class; None is the scenario's own
     watch           called once a simulated second, see `sim.loop.fly`
 
@@ -44,7 +42,8 @@ def fly_scenario(
     ------
     ValueError      one line: what is wrong with the configuration; nothing has been flown then
     """
-    changes: dict[str, Any] = {**(overrides or {}), "seed": seed, "flight": flight}
+    numbers = {"seed": seed, "flight": flight}
+    changes: dict[str, Any] = {**(overrides or {}), **{k: v for k, v in numbers.items() if v is not None}}
     maker = None if isinstance(estimator, str) else estimator
     if maker is not None:
         changes["estimator"] = f"{maker.__module__}:{getattr(maker, '__qualname__', type(maker).__name__)}"
@@ -65,12 +64,11 @@ def fly_config(
     rates = config.rates.build()
     suite = Suite(suite_params(config.suite, config.sensors), rates, config.seed, config.flight)
     estimator = maker() if maker is not None else _estimator(config)
-    pilot = _autopilot(config.autopilot, getattr(estimator, "heading_reference", "course"))
+    pilot = load_autopilot(config.autopilot, heading_reference_of(estimator))
     script = scenario.script(config)
     plant = JsbsimPlant(
         config.aircraft, start=start_of(config), air=air_of(config), rates=rates, seed=config.seed, flight=config.flight
     )
-    thrown = isinstance(config.start, HandThrowStart)
     flown = fly(
         plant,
         suite,
@@ -79,7 +77,7 @@ def fly_config(
         script,
         Log.empty(rates.ticks(plant.release_s + config.duration_s)),
         calibration_s=config.start.calibration_s if isinstance(config.start, HandThrowStart) else 0.0,
-        manifest={"scenario": scenario.name, "thrown": thrown, "config": config.model_dump(mode="json")},
+        manifest={"scenario": scenario.name, "seed": config.seed, "config": config.model_dump(mode="json")},
         watch=watch,
     )
     events = sorted((*flown.events, *scenario.events(flown)), key=lambda event: event.t_s)
@@ -134,11 +132,3 @@ def _estimator(config: FlightConfig) -> AttitudeEstimator:
         raise ValueError(f"estimator {config.estimator!r} has no parameters (a dataclass in its attribute params)")
     what = f"estimator {config.estimator}"
     return type(estimator)(changed(params, config.estimator_params, what))  # type: ignore[call-arg]
-
-
-def _autopilot(name: str, heading_reference: str) -> Autopilot:
-    """The autopilot by name; one that wants to know what the estimator's heading means is told."""
-    autopilot = load_autopilot(name)
-    if "heading_reference" in inspect.signature(type(autopilot)).parameters:
-        return type(autopilot)(heading_reference=heading_reference)  # type: ignore[call-arg]
-    return autopilot

@@ -7,26 +7,23 @@ in which the flights were named, so neither the number of workers nor their spee
 import multiprocessing
 import re
 import signal
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any
 
+from rich.text import Text
+
+from scenarios.harness import console
 from scenarios.harness.flight import fly_scenario
-from scenarios.harness.registry import find
+from scenarios.harness.preflight import prepared
+from scenarios.harness.registry import find, registered
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Outcome
 
 LARGEST_SEED = 2**32 - 1
-
-
-class Interrupted(Exception):
-    """Ctrl-C; `verdict` holds the flights that had been finished."""
-
-    def __init__(self, verdict: Verdict) -> None:
-        super().__init__(f"interrupted after {len(verdict.flights)} flights")
-        self.verdict = verdict
 
 
 class WorkerDied(RuntimeError):
@@ -46,6 +43,37 @@ class Task:
         """Fly it and judge it."""
         scenario = find(self.scenario)
         return judge(scenario, fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator))
+
+
+def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, changes: Mapping[str, Any]) -> list[Task]:
+    """Every scenario of `names` (all there are, where it is empty) on every seed.
+
+    Raises
+    ------
+    ValueError      one line: what cannot be flown, before anything is
+    """
+    wanted = list(dict.fromkeys(names or registered()))
+    for name in wanted:
+        prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
+    return [Task(name, seed, estimator, changes) for name in wanted for seed in seeds]
+
+
+def tell(verdict: Verdict) -> None:
+    """The pooled tables, then the flights that failed, each on a line."""
+    out = console.out()
+    for pool in verdict.pooled:
+        out.print(console.verdict_table(f"{pool.scenario}, {pool.estimator}, {pool.n_flights} flights", pool.rows))
+    for flight in verdict.flights:
+        if not flight.passed:
+            failed = ", ".join(
+                f"{row.name} {console.number(row.measured)} {row.unit}".rstrip()
+                for row in flight.rows
+                if not row.passed
+            )
+            why = f"{flight.outcome.replace('_', ' ')}: {flight.message}" if flight.message else failed
+            out.print(Text(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red"), soft_wrap=True)
+    flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))
+    out.print(f"passed: {flights} flights, {pooled} scenarios pooled")
 
 
 def parse_seeds(text: str) -> list[int]:
@@ -70,12 +98,16 @@ def parse_seeds(text: str) -> list[int]:
     return list(seeds)
 
 
-def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], None]) -> Verdict:
+def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], None]) -> tuple[Verdict, bool]:
     """Fly and judge all `tasks`; `advance` is told how many are done, of how many.
+
+    Returns
+    -------
+    the verdict on the flights that were finished, and whether these are all: Ctrl-C leaves some out
 
     Raises
     ------
-    Interrupted     on Ctrl-C      WorkerDied   where a process was killed      ValueError   as `fly_scenario` does
+    ValueError      as `fly_scenario` does          WorkerDied      where a process was killed
     """
     done: dict[int, FlightVerdict] = {}
 
@@ -92,15 +124,15 @@ def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], N
         else:
             _fly_over_processes(tasks, workers, keep)
     except KeyboardInterrupt:
-        raise Interrupted(_in_order(tasks, done)) from None
-    return _in_order(tasks, done)
+        pass  # what has been finished is judged; the caller sees that flights are missing
+    return Verdict.of((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(done) == len(tasks)
 
 
 def _fly_over_processes(tasks: Sequence[Task], workers: int, keep: Callable[[int, FlightVerdict], None]) -> None:
     # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
     context = multiprocessing.get_context("spawn")
     workers = min(workers, len(tasks))
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_leave_interrupts_to_the_parent) as pool:
+    with ProcessPoolExecutor(workers, mp_context=context, initializer=_set_up_worker) as pool:
         waiting: dict[Future[FlightVerdict], int] = {pool.submit(task.fly): i for i, task in enumerate(tasks)}
         try:
             while waiting:
@@ -112,9 +144,6 @@ def _fly_over_processes(tasks: Sequence[Task], workers: int, keep: Callable[[int
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _in_order(tasks: Sequence[Task], done: Mapping[int, FlightVerdict]) -> Verdict:
-    return Verdict.of((find(tasks[i].scenario), done[i]) for i in sorted(done))
+def _set_up_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    sys.stdout = sys.stderr  # standard output may be carrying JSON

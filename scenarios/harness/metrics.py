@@ -266,7 +266,7 @@ def pass_time_s(radius_m: float) -> Metric:
     def metric(flight: Flight) -> Measured:
         distance = launch_distance_m(flight)
         near = np.flatnonzero(distance.judged & (distance.value <= radius_m))
-        return Measured(float(distance.t_s[near[0]])) if len(near) else NOTHING
+        return Measured(float(distance.t_s[near[0]]) if len(near) else math.nan)
 
     return metric
 

@@ -80,10 +80,16 @@ def load_estimator(spec: str) -> "AttitudeEstimator":
         ``update(measurements)``, or a ``heading_reference`` that is neither "course" nor "nose".
     """
     estimator = _load(_ESTIMATOR, spec)
-    reference = getattr(estimator, "heading_reference", "course")
+    reference = heading_reference_of(estimator)
     if reference not in ("course", "nose"):
         raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
     return estimator  # type: ignore[no-any-return]
+
+
+def heading_reference_of(estimator: object) -> "HeadingReference":
+    """What the heading of `estimator` converges to; the course where it does not say."""
+    reference: HeadingReference = getattr(estimator, "heading_reference", "course")
+    return reference
 
 
 def load_autopilot(spec: str, heading_reference: "HeadingReference" = "course") -> "Autopilot":

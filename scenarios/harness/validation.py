@@ -23,7 +23,8 @@ _UNITS = (
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least"),
            "less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}  # fmt: skip
 _WHOLE = ("int_parsing", "int_type", "int_from_float")
-_BRANCHES = ("in_flight", "hand_throw", "float", "constrained-float", "HandMotion")  # of unions; they are no part of a field's name
+# Branches of unions that pydantic puts into the place of an error; they are no part of a field's name.
+_BRANCHES = ("in_flight", "hand_throw", "float", "constrained-float", "HandMotion")
 
 
 def unit_of(name: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.autopilot import _PARAMS, _STATE, DcmAutopilot
-from autopilot.guidance import GuidanceParams
+from autopilot.guidance import GuidanceParams, throttle_for
 from autopilot.interface import Mode, Setpoint
 from autopilot.launch import LaunchParams, climb_away, feel_throw
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
@@ -66,7 +66,7 @@ def test_feel_throw_push_of_2_75_g_is_felt_within_a_tenth_of_a_second(pitch_deg)
 
 
 def test_climb_away_follows_the_throw_from_no_power_to_the_height():
-    """Motor off in the hand and for the fingers, then full; the climb ends below the height and stays ended."""
+    """Motor off in the hand and for the fingers, then full, then that of the climb; it ends below the height and stays ended."""
     s, p, g = np.zeros(1, _STATE)[0], record("launch", PARAMS), record("guidance", GUIDANCE)
     row = np.zeros(1, MEASURED_DTYPE)[0]
     row["gps_valid"] = 1
@@ -75,10 +75,10 @@ def test_climb_away_follows_the_throw_from_no_power_to_the_height():
         row["gps_p_e_m"] = (0.0, 0.0, -height_m)
         return climb_away(thrown_s, 50.0, row, s, p, g, DT_S)
 
-    assert at(-1.0, 1.7) == (PARAMS.first_pitch_rad, 0.0)
-    assert at(0.1, 1.7) == (PARAMS.first_pitch_rad, 0.0)
-    assert at(0.3, 1.7) == (PARAMS.first_pitch_rad, 1.0)
-    assert at(5.0, 20.0) == (PARAMS.climb_pitch_rad, 1.0)
+    assert at(-1.0, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
+    assert at(0.05, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
+    assert at(0.3, 1.7) == (PARAMS.climb_pitch_rad, 1.0)
+    assert at(PARAMS.full_throttle_s, 20.0) == (PARAMS.climb_pitch_rad, throttle_for(PARAMS.climb_pitch_rad, g))
     near_pitch, near_throttle = at(12.0, 49.0)
     assert near_pitch < PARAMS.climb_pitch_rad
     assert near_throttle < 1.0

@@ -88,12 +88,12 @@ def test_return_heading_away_turns_back_at_the_limit_and_heading_home_flies_stra
 
 
 def test_launch_throw_starts_the_motor_after_the_delay():
-    """Launch: wings level throughout, motor 0.2 s after the throw is felt."""
+    """Launch: wings level throughout, motor 0.1 s after the throw is felt."""
     autopilot, setpoint = DcmAutopilot(), Setpoint(Mode.LAUNCH)
     thrown, flying = measurements(height_m=1.7, force_x=27.0), measurements(height_m=1.7)
     commands = [autopilot.update(LEVEL, thrown if k < 15 else flying, setpoint) for k in range(40)]
     on = next(k for k, c in enumerate(commands) if c.throttle > 0.0)
-    assert 10 <= on <= 15
+    assert 5 <= on <= 10
     assert all(c.throttle == 1.0 for c in commands[on:])
     assert all(c.bank_demand_rad == 0.0 for c in commands)
 

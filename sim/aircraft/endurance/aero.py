@@ -10,7 +10,7 @@ Helmbold, H. B., "Der unverwundene Ellipsenfluegel als tragende Flaeche", Jahrbu
 Luftfahrtforschung, pp. I 111-113: lift slope of a wing of any aspect ratio.
 Etkin, B. and Reid, L. D., "Dynamics of Flight", 3rd ed., 1996, chapters 2, 3 and 5: tail volume, downwash, damping.
 Beard, R. W. and McLain, T. W., "Small Unmanned Aircraft", 2012, Eqn 4.10: the blend over the stall.
-Lindenburg, C., "Stall and rotational effects", ECN-RX--01-004, 2001: normal force of stalled finite plates.
+Lindenburg, C., "Stall coefficients", ECN-RX--01-004, 2001: normal force of stalled finite plates.
 """
 
 from dataclasses import dataclass, field
@@ -118,7 +118,7 @@ class Aero:
 
     @cached_property
     def downwash(self) -> float:
-        """Change of downwash with alpha at the tail (Etkin & Reid, Eqn 2.3,6 for an elliptic wing)."""
+        """Change of downwash with alpha at the tail of an elliptic wing (Etkin & Reid, chapter 2)."""
         return 2.0 * self.wing_slope / (np.pi * self.outline.aspect)
 
     @cached_property
@@ -127,13 +127,13 @@ class Aero:
 
     @cached_property
     def cm_alpha(self) -> float:
-        """Wing ahead, tail behind, fuselage (Etkin & Reid, Eqn 2.3,16)."""
+        """Wing ahead, tail behind, fuselage (Etkin & Reid, chapter 2)."""
         wing = self.wing_slope * self.outline.wing_x_m / self.outline.chord_m
         return wing - self.tail_volume * self.tail_slope * (1.0 - self.downwash) + self.figures.cm_alpha_fuselage
 
     @cached_property
     def cm_q(self) -> float:
-        """Pitch damping; the lag of the downwash (alpha-dot) is lumped in (Etkin & Reid, Eqns 5.4,4 and 5.5,5)."""
+        """Pitch damping; the lag of the downwash (alpha-dot) is lumped in (Etkin & Reid, chapter 5)."""
         arm = self.outline.tail_arm_m / self.outline.chord_m
         return -2.0 * self.tail_volume * self.tail_slope * arm * (1.0 + self.downwash)
 

@@ -20,7 +20,7 @@ INERTIA_KG_M2 = (0.06, 0.08, 0.13)
 SERVO_LAG_RAD_S = 30.0
 SERVO_RATE_PER_S = 8.0  # full deflections a second: 60 deg of the arm in 0.17 s, 45 deg to the stop
 THROTTLE_RATE_PER_S = 2.0  # soft start of the speed controller
-MOTOR = {"volts": 11.1, "kv": 850.0, "ohm": 0.12, "no_load_a": 0.8}
+MOTOR = {"volts": 11.1, "kv": 850.0, "ohm": 0.14, "no_load_a": 0.8}
 ROTOR_INERTIA_KG_M2 = 1.0e-4
 # Advance ratio J = V / (n D), thrust and power coefficients; above J = 0.8 the air drives the propeller.  With the
 # throttle shut the controller brakes and the blades fold: no thrust, no drag.
@@ -62,7 +62,7 @@ def _alphas_deg() -> np.ndarray:
 def _table(variable: str, rows: list[tuple[float, float]]) -> str:
     body = "\n".join(f"          {x:8.1f} {y:10.5f}" for x, y in rows)
     return (
-        f"        <table>\n          <independentVar lookup=\"row\">{variable}</independentVar>\n"
+        f'        <table>\n          <independentVar lookup="row">{variable}</independentVar>\n'
         f"          <tableData>\n{body}\n          </tableData>\n        </table>"
     )
 

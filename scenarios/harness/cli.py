@@ -1,0 +1,266 @@
+"""The command line: ``wingslevel list | fly | check | bench | view``.
+
+Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
+problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
+imports wait until a command needs them.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from importlib.metadata import version as version_of
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scenarios.harness import console
+
+USAGE, INTERRUPTED = 2, 130
+FLIGHTS = Path("flights")  # where recordings go unless told otherwise
+
+app = typer.Typer(
+    name="wingslevel",
+    help="Fly a model aeroplane on an attitude estimate, through wind, and judge both.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+EstimatorOption = Annotated[
+    str | None, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
+]
+JsonOption = Annotated[
+    str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
+]
+WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command and return its exit code."""
+    try:
+        return int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
+    except typer.TyperException as problem:
+        console.error(problem.format_message())
+        return USAGE
+    except (typer.Abort, KeyboardInterrupt):
+        console.error("interrupted")
+        return INTERRUPTED
+
+
+@contextmanager
+def usage() -> Iterator[None]:
+    """What is refused inside the block is the user's to mend: one line, exit code 2."""
+    try:
+        yield
+    except ValueError as problem:
+        raise _refusal(str(problem)) from problem
+
+
+def _refusal(message: str) -> typer.TyperException:
+    return typer.TyperException(message)
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and stop.")] = False,
+) -> None:
+    if version:
+        typer.echo(f"wingslevel {version_of('wingslevel')}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command("list")
+def list_(json_: JsonOption = None) -> None:
+    """What there is: scenarios, estimators, autopilots, aircraft, sensor suites."""
+    from scenarios.harness.catalogue import catalogue
+
+    with _reporting(json_) as report:
+        found = catalogue()
+        for kind, things in found.items():
+            console.out().print(console.name_table(kind, things))
+        report(found)
+
+
+@app.command()
+def fly(
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
+    estimator: EstimatorOption = None,
+    aircraft: Annotated[str | None, typer.Option(help="Name of an aircraft.")] = None,
+    autopilot: Annotated[str | None, typer.Option(help="Registered name, module:Class or file.py:Class.")] = None,
+    wind: Annotated[
+        str | None, typer.Option(metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm.")
+    ] = None,
+    turbulence: Annotated[float | None, typer.Option(metavar="W20", help="Wind at 20 ft that scales it, m/s.")] = None,
+    gps_rate: Annotated[float | None, typer.Option(metavar="HZ", help="Reports of the GPS.")] = None,
+    imu_rate: Annotated[int | None, typer.Option(metavar="HZ", help="Gyro, accelerometer and the loop.")] = None,
+    sensors: Annotated[str | None, typer.Option(help="Name of a sensor suite.")] = None,
+    duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the flight after the release.")] = None,
+    seed: Annotated[int, typer.Option(help="Another seed, another flight; the same seed, the same bits.")] = 0,
+    set_: SetOption = None,
+    out: Annotated[Path, typer.Option(help="Folder for the recording.")] = FLIGHTS,
+    no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
+    live: Annotated[bool, typer.Option("--live", help="Watch it in the Rerun viewer, in real time.")] = False,
+    web: WebOption = False,
+    json_: JsonOption = None,
+) -> int:
+    """Fly a scenario once, record it, judge it."""
+    from scenarios.harness import single
+
+    named = {
+        "estimator": estimator,
+        "aircraft": aircraft,
+        "autopilot": autopilot,
+        "wind": wind,
+        "air.turbulence_w20_m_s": turbulence,
+        "rates.gps_hz": gps_rate,
+        "rates.imu_hz": imu_rate,
+        "suite": sensors,
+        "duration_s": duration,
+        "seed": seed,
+    }
+    with _reporting(json_) as report:
+        with usage():
+            changes = _changes(set_) | {name: value for name, value in named.items() if value is not None}
+            flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web)
+        single.tell(flown)
+        report(flown.to_json())
+    return flown.exit_code
+
+
+@app.command()
+def check(
+    names: Annotated[list[str] | None, typer.Argument(help="Scenarios; all of them where none is named.")] = None,
+    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")] = "0-9",
+    estimator: EstimatorOption = None,
+    set_: SetOption = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
+    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")] = None,
+    json_: JsonOption = None,
+) -> int:
+    """The gate for CI: fly scenarios on many seeds, judge each flight and all of them pooled."""
+    from scenarios.harness import gate
+
+    with _reporting(json_) as report:
+        with usage():
+            for path in (junit, markdown):
+                _check_file(path)
+            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, _changes(set_))
+            console.warn_if_cold()
+            with console.progress("flying", "flights") as advance:
+                verdict, whole = gate.fly_all(tasks, workers or _processors(), advance)
+        gate.tell(verdict)
+        if not whole:
+            report(verdict.to_json() | {"passed": False, "interrupted": True})
+            raise typer.Abort
+        _write(junit, verdict.to_junit)
+        _write(markdown, verdict.to_markdown)
+        report(verdict.to_json())
+    return verdict.exit_code
+
+
+@app.command()
+def bench(
+    estimator: Annotated[
+        str, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
+    ] = "premerlani",
+    seconds: Annotated[float, typer.Option(min=2.0, metavar="S", help="Simulated time of each repeat.")] = 30.0,
+    repeats: Annotated[int, typer.Option(min=3, help="Pairs of closed loop and bare JSBSim.")] = 20,
+    json_: JsonOption = None,
+) -> int:
+    """Speed: the closed loop against bare JSBSim in the same run, and the estimator alone."""
+    with _reporting(json_) as report:
+        from scenarios.harness import bench as benchmark
+
+        console.warn_if_cold()
+        with usage(), console.progress("measuring", "pairs") as advance:
+            speed = benchmark.measure(estimator, seconds, repeats, advance)
+        benchmark.tell(speed)
+        report(speed.to_json())
+    return 0 if speed.passed else 1
+
+
+@app.command()
+def view(
+    flight: Annotated[
+        Path | None, typer.Argument(help="Folder of a recording, or a .rrd or .parquet file; by default the newest.")
+    ] = None,
+    web: WebOption = False,
+) -> None:
+    """Open a recording in the Rerun viewer."""
+    from scenarios.harness import viewing
+
+    with usage():
+        shown = viewing.open_flight(flight or viewing.newest(FLIGHTS), web=web)
+    viewing.stay(shown)
+
+
+def _changes(assignments: list[str] | None) -> dict[str, Any]:
+    """Overrides of ``--set name=value``."""
+    changes = {}
+    for text in assignments or []:
+        name, equals, value = text.partition("=")
+        if not (name.strip() and equals):
+            raise _refusal(f"--set {text!r}: write name=value, for instance gps.latency_s=0.5")
+        changes[name.strip()] = value.strip()
+    return changes
+
+
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def _reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
+    """Gives what writes the JSON.  Where that goes to standard output, everything else goes to standard error."""
+    if target == "-":
+        stdout = sys.stdout
+        with redirect_stdout(sys.stderr):
+            yield lambda data: print(_text(data), file=stdout)
+    else:
+        path = Path(target) if target is not None else None
+        with usage():
+            _check_file(path)
+        yield lambda data: _write(path, lambda: _text(data) + "\n")
+
+
+def _text(data: Any) -> str:
+    return json.dumps(data, indent=2, allow_nan=False)
+
+
+def _check_file(path: Path | None) -> None:
+    """Refuse, before flying, a report that could not be written."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise _refusal(f"cannot write to {path}: it is a folder")
+    if not path.parent.is_dir():
+        raise _refusal(f"cannot write to {path}: there is no folder {path.parent}")
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise _refusal(f"cannot write to {path}: permission denied")
+
+
+def _write(path: Path | None, text: Callable[[], str]) -> None:
+    """Write a report, complete or not at all."""
+    if path is None:
+        return
+    from sim.recording import replacing
+
+    with usage(), replacing(path) as temporary:
+        temporary.write_text(text(), encoding="utf-8")

@@ -1,0 +1,96 @@
+"""One flight, as the command line flies it: refused early or flown, recorded, judged and told."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.text import Text
+
+from scenarios.harness import console, viewing
+from scenarios.harness.config import FlightConfig
+from scenarios.harness.flight import fly_config
+from scenarios.harness.preflight import prepared
+from scenarios.harness.scenario import Scenario
+from scenarios.harness.verdict import FlightVerdict, Verdict, judge
+from sim import recording
+from sim.log import Flight, Log, Outcome
+
+INTERRUPTED = 130
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """A flight that was flown, recorded and judged."""
+
+    scenario: Scenario
+    flight: Flight
+    judged: FlightVerdict
+    folder: Path
+
+    @property
+    def exit_code(self) -> int:
+        """As of the command line."""
+        if self.flight.outcome == Outcome.INTERRUPTED:
+            return INTERRUPTED
+        return self._verdict.exit_code
+
+    @property
+    def _verdict(self) -> Verdict:
+        return Verdict.of([(self.scenario, self.judged)])
+
+    def to_json(self) -> dict[str, Any]:
+        """The verdict, and where the recording lies."""
+        return self._verdict.to_json() | {"recording": str(self.folder)}
+
+
+def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bool, live: bool, web: bool) -> Flown:
+    """Fly, record below the folder `into`, judge.
+
+    rerun : write a Rerun recording too             live : show it in the viewer while it is flown, in real time
+    web : the viewer in a browser
+
+    Raises
+    ------
+    ValueError      one line: scenario, configuration or folder; nothing has been flown or written then
+    """
+    scenario, config = prepared(scenario_name, changes)
+    recording.check_writable(into)
+    console.warn_if_cold()
+    live_view = viewing.live(scenario.name, config, web=web) if live else None
+    with console.progress(f"flying {scenario.name}", "s") as advance:
+
+        def watch(log: Log, n_rows: int) -> None:
+            advance(n_rows / config.rates.imu_hz, len(log) / config.rates.imu_hz)
+            if live_view is not None:
+                live_view(log, n_rows)
+
+        flight = fly_config(scenario, config, watch=watch)
+    if live_view is not None:
+        live_view.close(flight)
+    folder = recording.save(flight, _free_folder(into, scenario.name, config))
+    if rerun:
+        viewing.write_rerun(flight, folder)
+    return Flown(scenario, flight, judge(scenario, flight), folder)
+
+
+def tell(flown: Flown) -> None:
+    """The verdict, how the flight ended, and where to see it."""
+    out, flight, judged = console.out(), flown.flight, flown.judged
+    out.print(console.verdict_table(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}", judged.rows))
+    ended = (
+        f"{flight.outcome.replace('_', ' ')} {len(flight.log) * flight.dt_s - flight.release_s:.1f} s after the release"
+    )
+    planned = flight.outcome == Outcome.COMPLETED
+    out.print(
+        Text(f"{ended}: {flight.message}" if flight.message else ended, "" if planned else "bold red"), soft_wrap=True
+    )
+    out.print(Text(f"recording   {flown.folder}\nto see it   wingslevel view {flown.folder}"), soft_wrap=True)
+
+
+def _free_folder(into: Path, scenario: str, config: FlightConfig) -> Path:
+    """A folder that is not there yet: no flight is ever written over another."""
+    estimator = config.estimator.rpartition(":")[2]
+    name = f"{scenario}-{estimator}-seed{config.seed}"
+    tries = (into / (name if i == 1 else f"{name}-{i}") for i in range(1, 1_000_000))
+    return next(path for path in tries if not path.exists())

@@ -1,0 +1,44 @@
+"""The story of a flight in words: what was flown, how it ended, and its verdict."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from sim.log import Flight
+
+
+def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> Any:
+    """Entry `name` of the manifest, or of the resolved configuration in it (``config``)."""
+    value = manifest.get(name, (manifest.get("config") or {}).get(name))
+    return otherwise if value is None else value
+
+
+def story(flight: Flight) -> str:
+    """What was flown and how it went, as Markdown."""
+    manifest = flight.manifest
+    names = [setting(manifest, name) for name in ("scenario", "aircraft", "estimator", "autopilot")]
+    what = ", ".join([*(str(name) for name in names if name), f"seed {setting(manifest, 'seed', 0)}"])
+    end_s = float(flight.log.truth["t_s"][-1]) - flight.release_s if len(flight.log) else 0.0
+    how = flight.outcome.replace("_", " ").capitalize() + f" at {end_s:.1f} s"
+    lines = [f"## {what}", "", how + (f": {flight.message}. " if flight.message else ". ") + _air(manifest), ""]
+    verdict = manifest.get("verdict") or ()
+    if verdict:
+        lines += ["| check | measured | limit | |", "|-|-:|-:|-|"]
+        for row in verdict:
+            measured, limit = (_figure(row[key], row["unit"]) for key in ("measured", "limit"))
+            passed = "passed" if row["passed"] else "**FAILED**"
+            lines.append(f"| {row['name']} | {measured} | {row.get('sense', '<=')} {limit} | {passed} |")
+    lines += ["", f"Heading is judged against the true {flight.heading_reference}.", ""]
+    lines += ["Orange is the truth, blue the estimate, green a sensor, grey a demand."]
+    return "\n".join(lines)
+
+
+def _air(manifest: Mapping[str, Any]) -> str:
+    air = setting(manifest, "air")
+    if not air:
+        return ""
+    wind = f"Wind {air['wind_m_s']:g} m/s from {air['wind_from_deg']:.0f}°" if air["wind_m_s"] else "No wind"
+    return wind + (f", turbulence W20 = {air['turbulence_w20_m_s']:g} m/s." if air["turbulence_w20_m_s"] else ".")
+
+
+def _figure(value: Any, unit: str) -> str:
+    return f"{value:.3g} {unit}".strip() if isinstance(value, int | float) else "not measured"

@@ -1,0 +1,152 @@
+"""The scenarios flown: the oracle and the default estimator pass, broken estimators do not, flights repeat."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from estimator.interface import AttitudeEstimate
+from scenarios.harness.config import FlightConfig
+from scenarios.harness.flight import fly_config, fly_scenario
+from scenarios.harness.manoeuvres import roll_outs
+from scenarios.harness.registry import find, registered
+from scenarios.harness.verdict import Verdict, judge
+from sim.log import Flight, Outcome, Phase
+
+NAMES = sorted(registered())
+
+
+@cache
+def flown(name: str, seed: int, estimator: str) -> Flight:
+    """A flight, flown once for all the tests that look at it."""
+    return fly_scenario(find(name), seed=seed, estimator=estimator)
+
+
+def same(a: Flight, b: Flight) -> bool:
+    """Whether two logs are equal to the last bit."""
+    return all(
+        getattr(a.log, table).tobytes() == getattr(b.log, table).tobytes() for table in ("truth", "measured", "flown")
+    )
+
+
+class AlwaysLevel:
+    """Believes that it flies level and north whatever it is told."""
+
+    def update(self, _m):
+        return AttitudeEstimate(np.eye(3))
+
+
+class UpsideDown:
+    """Believes that it lies on its back."""
+
+    def update(self, _m):
+        return AttitudeEstimate(np.diag((1.0, -1.0, -1.0)))
+
+
+class RaisesAtThree:
+    """Gives up 3 s after power-up."""
+
+    def update(self, m):
+        if m.imu.t_s > 3.0:
+            raise RuntimeError("had enough")
+        return AttitudeEstimate(np.eye(3))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_oracle_passes_every_scenario(name):
+    """Steering on the truth passes: what fails with an estimator is the estimator's fault."""
+    scenario = find(name)
+    verdict = Verdict.of((scenario, judge(scenario, flown(name, seed, "oracle"))) for seed in (0, 1))
+    assert verdict.passed, verdict.to_markdown()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_default_estimator_passes_every_scenario(name):
+    """The gate of the project on two seeds; the pooled limits are for ten, so each flight has its own here."""
+    scenario = find(name)
+    for seed in (0, 1):
+        verdict = judge(scenario, flown(name, seed, "premerlani"))
+        assert verdict.passed, (verdict.outcome, verdict.message, [row for row in verdict.rows if not row.passed])
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("broken", [AlwaysLevel, UpsideDown])
+def test_broken_estimator_fails_every_scenario(name, broken):
+    """A gate that lets through whoever does not look at the sensors is none."""
+    scenario = find(name)
+    assert not judge(scenario, fly_scenario(scenario, estimator=broken)).passed
+
+
+def test_estimator_that_raises_ends_the_flight_with_its_name_and_the_time():
+    """The flight up to there is judged, and the exit code is 1."""
+    scenario = find("crosswind")
+    flight = fly_scenario(scenario, estimator=RaisesAtThree)
+    assert flight.outcome == Outcome.ESTIMATOR_FAILED
+    assert "RaisesAtThree at 3.02 s" in flight.message
+    assert len(flight.log) == 150
+    assert Verdict.of([(scenario, judge(scenario, flight))]).exit_code == 1
+
+
+def test_flight_of_the_same_seed_is_bit_equal_and_of_another_is_not():
+    """In every column of truth, measurements and estimate."""
+    scenario = find("hand_launch")
+    assert same(fly_scenario(scenario, seed=0), flown("hand_launch", 0, "premerlani"))
+    assert not same(flown("hand_launch", 1, "premerlani"), flown("hand_launch", 0, "premerlani"))
+
+
+def test_flight_flown_again_from_its_manifest_is_bit_equal():
+    """The resolved configuration is all it takes."""
+    scenario, overrides = find("hand_launch"), {"wind": "4@random", "gps.latency_s": "0.6", "duration_s": "6"}
+    first = fly_scenario(scenario, overrides, seed=3)
+    assert same(first, fly_config(scenario, FlightConfig(**first.manifest["config"])))
+
+
+def test_hand_launch_is_held_thrown_and_then_flies():
+    """8 s in the hand at 1.7 m, then 0.3 s of 27 m/s^2: 8.1 m/s along the nose, over the ground, at the release."""
+    flight = flown("hand_launch", 0, "oracle")
+    truth = flight.log.truth
+    phases = truth["phase"][np.flatnonzero(np.diff(truth["phase"], prepend=-1))]
+    assert list(phases) == [Phase.HELD, Phase.THROWN, Phase.FLYING]
+    assert flight.release_s == pytest.approx(8.3, rel=0, abs=1e-9)
+    held = truth[truth["phase"] == Phase.HELD]
+    np.testing.assert_allclose(-held["p_e_m"][:, 2], 1.7, rtol=0, atol=1e-6)
+    # The nose turns with the wrist while it is pushed, at 15 deg/s: that bends the path, and costs 1 % at most.
+    released = truth[truth["phase"] == Phase.THROWN][-1]
+    assert np.linalg.norm(released["v_e_m_s"]) == pytest.approx(8.1, rel=0, abs=0.1)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_wind_comes_from_where_it_was_said_to(side):
+    """5 m/s from the left of a northward flight blows east; turbulence off, so to the last digits of a degree."""
+    from_deg, east_m_s = {"left": (270.0, 5.0), "right": (90.0, -5.0)}[side]
+    overrides = {
+        "start.heading_deg": 0, "wind": f"5@{from_deg}", "air.turbulence_w20_m_s": 0, "duration_s": 25,
+    }  # fmt: skip
+    flight = fly_scenario(find("crosswind"), overrides, estimator="oracle")
+    np.testing.assert_allclose(
+        flight.log.truth["wind_e_m_s"][:, :2], [[0.0, east_m_s]] * len(flight.log), rtol=0, atol=0.01
+    )
+    # Holding the course, the nose is asin(5 / airspeed) into the wind.
+    last = flight.log.truth[-1]
+    crab_rad = np.arctan2(last["R_eb"][1, 0], last["R_eb"][0, 0])
+    assert np.sin(crab_rad) == pytest.approx(-east_m_s / last["airspeed_m_s"], rel=0, abs=0.06)  # 3.5 degrees
+
+
+def test_turns_180_are_turns_of_the_course_by_half_a_circle():
+    """Three roll-outs; the course 10 s after each is the opposite of that before, within the weave of the hold."""
+    flight = flown("turns_180", 0, "oracle")
+    t_s, v = flight.log.truth["t_s"], flight.log.truth["v_e_m_s"]
+    course = np.unwrap(np.arctan2(v[:, 1], v[:, 0]))
+    outs = roll_outs(flight)
+    assert len(outs) == 3
+    settled = [course[np.searchsorted(t_s, t)] for t in (24.0, *(r.t_s + 15.0 for r in outs))]
+    turned_deg = np.degrees(np.abs(np.diff(settled)))
+    np.testing.assert_allclose(turned_deg, 180.0, rtol=0, atol=12.0)
+    straight_s = [r.until_s - r.t_s for r in outs]
+    assert min(straight_s) >= 30.0
+
+
+def test_milestones_are_events_of_the_flight():
+    """The end of the third loop, the roll-outs and the pass home are in the recording."""
+    texts = {e.text for name in ("loops", "turns_180", "return_to_launch") for e in flown(name, 0, "oracle").events}
+    assert texts >= {"third loop ended", "rolled out", "over the launch point"}

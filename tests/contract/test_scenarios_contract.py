@@ -1,0 +1,125 @@
+"""What every registered scenario obeys, and what the registry says of those that are none."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenarios
+from autopilot.interface import Mode
+from scenarios.harness.config import FlightConfig, resolve
+from scenarios.harness.metrics import planned_end_s
+from scenarios.harness.registry import find, registered
+from scenarios.harness.verdict import judge
+from sim.log import Flight, Log, Outcome, Phase
+
+NAMES = sorted(registered())
+SECTIONS = ("Story", "Verifies", "Aircraft", "Wind", "Sensors", "Passes when")
+
+
+def test_registry_holds_the_five_scenarios_by_the_names_of_their_files():
+    """Found by listing the package; a file that is none would have been an error."""
+    assert set(NAMES) >= {"hand_launch", "crosswind", "turns_180", "loops", "return_to_launch"}
+    files = {path.stem for folder in scenarios.__path__ for path in Path(folder).glob("*.py")}
+    assert set(NAMES) == files - {"__init__"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_story_has_every_section(name):
+    """The docstring of the file is the table that people read."""
+    scenario = find(name)
+    assert scenario.name == name
+    lines = scenario.story.splitlines()
+    for section in SECTIONS:
+        assert any(line.startswith(section) for line in lines), section
+    assert scenario.told_as.endswith(".")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_resolves_alike_from_the_same_seed_and_survives_json(name):
+    """The resolved configuration is plain numbers, the same each time, another for another seed."""
+    scenario = find(name)
+    first = resolve(scenario.config)
+    assert resolve(scenario.config) == first
+    assert FlightConfig(**json.loads(first.model_dump_json())) == first
+    other = resolve(scenario.config.model_copy(update={"seed": 1}))
+    assert other.heading_deg != first.heading_deg
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_script_begins_at_the_start_and_ends_before_the_flight(name):
+    """Nothing is commanded that is never flown; the first set-point is there from the start."""
+    scenario = find(name)
+    config = resolve(scenario.config)
+    timed = list(scenario.script(config))
+    assert timed[0].t_s <= 0.0
+    assert timed[-1].t_s < config.duration_s
+    assert all(isinstance(t.setpoint.mode, Mode) for t in timed)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_checks_demand_survival_and_say_their_units(name):
+    """A name, a unit for all that has a dimension, and survival first."""
+    checks = find(name).checks
+    assert checks[0].name == "survived"
+    assert all(check.name and (check.unit or check.name == "survived") for check in checks)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("n_ticks", [0, 1, 500])
+def test_scenario_checks_fail_a_flight_that_ended_early(name, n_ticks):
+    """No check of the estimate or the manoeuvre passes on a flight of no, one or 500 ticks, and none raises."""
+    scenario = find(name)
+    log = Log.empty(n_ticks)
+    log.truth["R_eb"], log.truth["phase"] = log.flown["R_eb"], Phase.FLYING
+    log.truth["t_s"] = 0.02 * np.arange(1, n_ticks + 1)
+    config = resolve(scenario.config).model_dump(mode="json")
+    flight = Flight(log, 0.02, 0.0, Outcome.GROUND_CONTACT, "course", manifest={"config": config})
+    assert planned_end_s(flight) == scenario.config.duration_s
+    verdict = judge(scenario, flight)
+    over_windows = [row for row in verdict.rows if row.name.startswith(("inclination", "heading", "loops flown"))]
+    assert not verdict.passed
+    assert not any(row.passed for row in (verdict.rows[0], *over_windows))
+    assert scenario.events(flight) is not None
+
+
+def test_find_of_an_unknown_scenario_names_the_near_misses():
+    """One line, with what was probably meant."""
+    with pytest.raises(ValueError, match=r"unknown scenario 'hand_lunch': did you mean hand_launch"):
+        find("hand_lunch")
+
+
+def test_find_of_ones_own_file_is_its_scenario(tmp_path):
+    """A file that exports SCENARIO is as good as a registered one."""
+    path = tmp_path / "mine.py"
+    path.write_text(
+        "from dataclasses import replace\n"
+        "from scenarios.crosswind import SCENARIO as crosswind\n"
+        "SCENARIO = replace(crosswind, name='mine')\n"
+    )
+    assert find(str(path)).name == "mine"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x = 1\n", "must export SCENARIO"),
+        ("1 / 0\n", "ZeroDivisionError"),
+        ("def (\n", "SyntaxError"),
+    ],
+)
+def test_find_of_a_file_that_holds_none_is_refused_in_one_line(tmp_path, text, words):
+    """Whatever is wrong in the file, the line names it."""
+    path = tmp_path / "broken.py"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=words) as refused:
+        find(str(path))
+    assert "broken.py" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_find_of_a_file_that_is_not_there_is_refused(tmp_path):
+    """The path as it was typed."""
+    with pytest.raises(ValueError, match="no file"):
+        find(str(tmp_path / "nowhere.py"))

@@ -1,0 +1,219 @@
+"""The aeroplane flown: trim, stall, climb, roll, pitch, loops, and wild states.
+
+Limits are engineering ones: the class of aeroplane, with the measured value beside each.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from autopilot.interface import NEUTRAL, ActuatorCommand
+from sim.jsbsim_plant import JsbsimPlant
+from sim.log import Log
+from sim.plant import InFlight
+from sim.trim import Trim, accelerations, trim
+
+HEIGHT_M = 200.0
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return JsbsimPlant(start=InFlight(heading_rad=0.0, height_m=HEIGHT_M))
+
+
+@pytest.fixture(scope="module")
+def trimmed(plant):
+    return plant.trimmed.command
+
+
+def fly(plant, seconds, pilot):
+    """Truth rows of `seconds`; `pilot(t_s, last row)` gives the command."""
+    log = Log.empty(round(seconds / plant.dt_s))
+    plant.reset(log)
+    for k in range(len(log)):
+        assert plant.advance(k, pilot(k * plant.dt_s, log.truth[max(k - 1, 0)])) is None
+    return log.truth
+
+
+def level(row):
+    """Aileron that levels the wings."""
+    return float(np.clip(-2.0 * row["R_eb"][2, 1] - 0.15 * row["omega_b_rad_s"][0], -1.0, 1.0))
+
+
+def bank_deg(rows):
+    return np.degrees(np.arctan2(rows["R_eb"][:, 2, 1], rows["R_eb"][:, 2, 2]))
+
+
+def test_cruise_of_the_airframe_file_is_what_the_root_finder_finds(plant):
+    """The numbers in airframe.toml are those of the model, and nothing accelerates there but by Coriolis."""
+    cruise = plant.airframe["cruise"]
+    found = trim(plant.model, cruise["airspeed_m_s"])
+    listed = Trim.of(cruise)
+    np.testing.assert_allclose(  # as many digits as the file has
+        [found.alpha_rad, found.elevator, found.throttle, found.aileron],
+        [listed.alpha_rad, listed.elevator, listed.throttle, 0.0], rtol=0, atol=1e-5,
+    )  # fmt: skip
+    remaining = accelerations(plant.model, listed, 60.0)
+    rpm = plant.model.get("propulsion/engine/propeller-rpm")[0]
+    assert abs(rpm - cruise["rotor_rpm"]) < 1.0
+    coriolis_m_s2 = 2.0 * 7.292115e-5 * cruise["airspeed_m_s"]
+    assert np.abs(remaining[:3]).max() < coriolis_m_s2 + 1e-4
+    assert np.abs(remaining[3:]).max() < 1e-3
+
+
+def test_trimmed_start_after_a_second_hardly_accelerates(plant, trimmed):
+    """One second into a start in the air everything is still as it was."""
+    rows = fly(plant, 1.0, lambda _t, _row: trimmed)
+    np.testing.assert_allclose(rows["v_e_m_s"][-1] - rows["v_e_m_s"][0], 0.0, rtol=0, atol=0.02)
+    np.testing.assert_allclose(rows["omega_b_rad_s"], 0.0, rtol=0, atol=0.002)
+    assert abs(np.diff(rows["rotor_rpm"])).max() < 5.0
+
+
+def test_stall_speed_in_a_slow_deceleration_is_of_the_class(plant):
+    """The lowest speed at which the wing carries the weight lies between 6.5 and 7.5 m/s (measured 7.1)."""
+    rows = fly(plant, 12.0, lambda t, row: ActuatorCommand(level(row), 0.05 * t, 0.0, 0.0))
+    carried = rows["imu_force_b_m_s2"][:, 2] < -0.95 * 9.8
+    slowest = rows["airspeed_m_s"][carried].min()
+    assert 6.5 < slowest < 7.5
+
+
+def test_full_up_elevator_at_idle_mushes_down_stalled(plant):
+    """Held fully up with the motor off it sinks wings level, stalled, and no faster than a parachute of its size."""
+    rows = fly(plant, 14.0, lambda _t, row: ActuatorCommand(level(row), 1.0, 0.0, 0.0))[-200:]
+    assert np.degrees(rows["alpha_rad"]).min() > 12.0  # measured 15
+    sink = rows["v_e_m_s"][:, 2].mean()
+    assert 2.0 < sink < 5.0  # measured 2.8
+    assert np.abs(bank_deg(rows)).max() < 5.0
+
+
+def test_glide_with_the_motor_off_is_of_the_class(plant):
+    """Best glide ratio between 8 and 12 (measured 10), from the energy lost over a long glide."""
+    rows = fly(plant, 20.0, lambda _t, row: ActuatorCommand(level(row), 0.16, 0.0, 0.0))
+    settled = rows[500:]
+    v = settled["v_e_m_s"]
+    lost_m = (np.diff(0.5 * np.sum(v[[0, -1]] ** 2, axis=1)) / 9.8 - np.diff(settled["p_e_m"][[0, -1], 2]))[0]
+    way_m = np.sum(np.hypot(v[:, 0], v[:, 1])) * 0.02
+    assert 8.0 < way_m / -lost_m < 12.0
+
+
+def test_climb_at_full_throttle_is_of_the_class(plant):
+    """Full throttle and a little up elevator climb at 3 to 6 m/s (measured 4.5)."""
+    rows = fly(plant, 16.0, lambda _t, row: ActuatorCommand(level(row), 0.05, 0.0, 1.0))[400:]
+    v = rows["v_e_m_s"]
+    gained = -np.diff(rows["p_e_m"][[0, -1], 2])[0] + np.diff(0.5 * np.sum(v[[0, -1]] ** 2, axis=1))[0] / 9.8
+    assert 3.0 < gained / (len(rows) * 0.02) < 6.0
+
+
+def test_static_thrust_is_of_the_class(plant):
+    """Held still at full throttle the propeller pulls 8 to 9 N (measured 8.9)."""
+    plant.model.place(10.0, (0.0, 0.0, 0.0), np.zeros(3), (0.0,) * 3, ActuatorCommand(0, 0, 0, 1.0), plant.air, 400)
+    thrust_n = 4.4482216 * plant.model.get("propulsion/engine/thrust-lbs")[0]
+    assert 8.0 < thrust_n < 9.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_full_aileron_at_cruise_rolls_its_own_way_fast_enough(plant, trimmed, sign):
+    """Positive aileron rolls right, at 120 deg/s or more (measured 192, down to 128 through knife edge)."""
+    rows = fly(plant, 1.0, lambda _t, _row: trimmed._replace(aileron=sign))
+    assert np.degrees(sign * rows["omega_b_rad_s"][10:, 0]).min() > 120.0
+    assert sign * rows["aileron"][-1] == pytest.approx(1.0, rel=0, abs=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rudder_yaws_its_own_way(plant, trimmed, sign):
+    """Positive rudder moves the nose to the right, and the right wing then drops."""
+    rows = fly(plant, 1.0, lambda _t, _row: trimmed._replace(rudder=sign * 0.5))
+    assert np.degrees(sign * rows["omega_b_rad_s"][15, 2]) > 10.0
+    assert sign * rows["beta_rad"][25] < 0.0
+    assert sign * bank_deg(rows)[-1] > 5.0
+
+
+def test_full_elevator_at_loop_speed_pitches_fast_enough():
+    """Positive elevator pitches up; from 17 m/s at 130 deg/s or more (measured 152)."""
+    plant = JsbsimPlant(start=InFlight(0.0, HEIGHT_M, airspeed_m_s=17.0))
+    rows = fly(plant, 1.0, lambda _t, _row: ActuatorCommand(0.0, 1.0, 0.0, 1.0))
+    assert np.degrees(rows["omega_b_rad_s"][:, 1]).max() > 130.0
+
+
+def test_loop_at_full_throttle_closes_with_the_radius_of_the_class():
+    """From 17 m/s with 0.7 up elevator: all the way round, mean radius of 7 to 10 m (measured 8.3)."""
+    plant = JsbsimPlant(start=InFlight(0.0, HEIGHT_M, airspeed_m_s=17.0))
+
+    def pilot(_t, row):
+        return ActuatorCommand(float(-0.15 * row["omega_b_rad_s"][0]), 0.7, 0.0, 1.0)
+
+    rows = fly(plant, 6.0, pilot)
+    angle = np.cumsum(rows["imu_omega_b_rad_s"][:, 1]) * 0.02
+    assert angle[-1] > 2.0 * np.pi
+    once = rows[: int(np.argmax(angle > 2.0 * np.pi))]
+    radius_m = 0.5 * np.ptp(once["p_e_m"][:, 2])
+    assert 7.0 < radius_m < 10.0
+    assert once["R_eb"][:, 2, 2].min() < -0.95  # inverted on top
+
+
+def test_spiral_from_a_bank_hands_off_is_near_neutral(plant, trimmed):
+    """Left alone in a bank of 25 degrees it neither snaps upright nor tightens: 15 s later 10 to 40 degrees."""
+    rows = fly(plant, 20.0, lambda t, _row: trimmed._replace(aileron=0.5 if t < 0.4 else 0.0))
+    bank = bank_deg(rows)
+    assert 20.0 < bank[100] < 35.0
+    assert 10.0 < bank[-100] < 40.0  # measured 16
+
+
+def test_dutch_roll_after_a_rudder_doublet_dies_out(plant, trimmed):
+    """Two periods after the doublet less than a tenth of the sideslip is left (measured 0.04)."""
+
+    def pilot(t, _row):
+        return trimmed._replace(rudder=1.0 if t < 0.4 else -1.0 if t < 0.8 else 0.0)
+
+    beta = np.degrees(fly(plant, 5.0, pilot)["beta_rad"])
+    assert np.abs(beta).max() > 10.0
+    assert np.abs(beta[175:]).max() < 0.1 * np.abs(beta).max()
+
+
+def test_hands_off_cruise_stays_upright_for_a_minute(plant, trimmed):
+    """The motor's torque is trimmed out: after a minute the bank is below 5 degrees (measured 1.4)."""
+    rows = fly(plant, 60.0, lambda _t, _row: trimmed)
+    assert np.abs(bank_deg(rows)).max() < 5.0
+    np.testing.assert_allclose(rows["airspeed_m_s"], 12.6, rtol=0, atol=0.5)
+
+
+wild_rate = st.floats(-6.0, 6.0)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    quaternion=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
+    v_b=st.tuples(st.floats(-15.0, 25.0), st.floats(-15.0, 15.0), st.floats(-15.0, 15.0)),
+    omega=st.tuples(wild_rate, wild_rate, wild_rate),
+    command=st.builds(ActuatorCommand, *[st.floats(-1.0, 1.0)] * 3, st.floats(0.0, 1.0)),
+)
+def test_wild_state_any_attitude_and_motion_stays_finite(plant, quaternion, v_b, omega, command):
+    """Tail slides, inverted, backwards, sideways, stalled, spun: five seconds later it is still a flight."""
+    log = Log.empty(250)
+    plant.reset(log)
+    yaw, pitch, roll = Rotation.from_quat(quaternion).as_euler("ZYX")
+    plant.begin((0.0, 0.0, -HEIGHT_M), (roll, pitch, yaw), np.array(v_b), omega, command, settle_s=0.1)
+    for k in range(250):
+        assert plant.advance(k, command) is None
+    for name in log.truth.dtype.names:
+        assert np.isfinite(log.truth[name]).all()
+    # Terminal speed of a dive is 38 m/s; nothing that falls for 5 s from 33 m/s is faster than 50.
+    assert log.truth["airspeed_m_s"].max() < 50.0
+    assert np.abs(log.truth["omega_b_rad_s"]).max() < 40.0
+    np.testing.assert_allclose(np.linalg.det(log.truth["R_eb"]), 1.0, rtol=0, atol=1e-12)
+
+
+def test_tail_slide_comes_out_nose_down(plant):
+    """Dropped backwards from the vertical it swaps ends and flies on, nose below the horizon."""
+    log = Log.empty(100)
+    plant.reset(log)
+    plant.begin((0.0, 0.0, -HEIGHT_M), (0.0, math.radians(88.0), 0.0), np.array([-5.0, 0.0, 0.0]))
+    for k in range(100):
+        assert plant.advance(k, NEUTRAL) is None
+    assert np.degrees(np.abs(log.truth["alpha_rad"])).max() > 150.0
+    assert log.truth["R_eb"][:, 2, 0].max() > 0.7  # minus the sine of the pitch angle
+    assert abs(np.degrees(log.truth["alpha_rad"][-1])) < 20.0

@@ -1,0 +1,123 @@
+"""Checks: what passes, what never may, and how flights are pooled."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.harness.checks import LOOSEST, SURVIVED, Check
+from scenarios.harness.metrics import Measured
+from sim.log import Flight, Log, Outcome
+
+FLIGHT = Flight(Log.empty(1), 0.02, 0.0, Outcome.COMPLETED, "course")
+
+
+def check_of(value, *, samples=1, expected=1, limit=4.0, **more):
+    """A check whose metric measures `value`."""
+    return Check("error", "deg", lambda _flight: Measured(value, samples, expected), limit, **more)
+
+
+def rows_of(values, **more):
+    """The check, and a row of it for each of the values."""
+    rows = [check_of(value, **more).judge(FLIGHT) for value in values]
+    return check_of(0.0, **more), rows
+
+
+@pytest.mark.parametrize(
+    ("value", "sense", "passes"),
+    [
+        (4.0, "<=", True),
+        (np.nextafter(4.0, 5.0), "<=", False),
+        (4.0, ">=", True),
+        (np.nextafter(4.0, 3.0), ">=", False),
+    ],
+)
+def test_judge_at_the_limit_passes_and_one_digit_beyond_does_not(value, sense, passes):
+    """The limit itself is allowed."""
+    assert check_of(value, sense=sense).judge(FLIGHT).passed is passes
+
+
+@pytest.mark.parametrize("sense", ["<=", ">="])
+@pytest.mark.parametrize("pooled", ["rms", "worst", "count"])
+def test_judge_and_pool_of_nan_fail(sense, pooled):
+    """What is not a number passes no limit, alone or among good flights."""
+    good = 1.0 if sense == "<=" else 9.0
+    check, rows = rows_of([good, math.nan, good], sense=sense, pooled=pooled)
+    assert [row.passed for row in rows] == [True, False, True]
+    assert not check.pool(rows).passed
+
+
+def test_judge_and_pool_of_too_few_samples_fail_with_a_note():
+    """The best of values on half a window does not pass, and the row says why."""
+    row = check_of(0.0, samples=250, expected=500).judge(FLIGHT)
+    assert not row.passed
+    assert row.note == "250 of 500 samples"
+    pooled = check_of(0.0).pool([check_of(0.0).judge(FLIGHT), row])
+    assert not pooled.passed
+    assert pooled.note == "1 of 2 flights too short"
+
+
+def test_judge_of_an_empty_window_fails():
+    """No samples where none were expected is a mistake in the scenario, not a pass."""
+    assert not check_of(0.0, samples=0, expected=0).judge(FLIGHT).passed
+
+
+@given(st.lists(st.floats(0.0, 1e3), min_size=2, max_size=20))
+def test_pool_by_rms_is_the_root_of_the_mean_square(values):
+    """Against NumPy's norm."""
+    check, rows = rows_of(values, pooled="rms")
+    expected = np.linalg.norm(values) / math.sqrt(len(values))
+    assert check.pool(rows).measured == pytest.approx(expected, rel=1e-12, abs=1e-100)
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=20), st.sampled_from(["<=", ">="]))
+def test_pool_by_worst_is_the_value_furthest_over_the_limit(values, sense):
+    """The largest where small is good, the smallest where large is."""
+    check, rows = rows_of(values, sense=sense)
+    assert check.pool(rows).measured == (max(values) if sense == "<=" else min(values))
+
+
+def test_pool_by_count_counts_the_flights_that_pass():
+    """Two of three is not three of three."""
+    check, rows = rows_of([1.0, 5.0, 2.0], pooled="count")
+    pooled = check.pool(rows)
+    assert (pooled.measured, pooled.limit, pooled.unit, pooled.passed) == (2, 3, "flights", False)
+    assert check.pool(rows[::2]).passed
+
+
+def test_pool_of_several_flights_uses_the_pooled_limit_and_of_one_its_own():
+    """A flight may be 1.5 times as bad as all together; alone it is judged as a flight."""
+    check, rows = rows_of([5.0, 5.0], pooled="rms", per_flight_limit=6.0)
+    assert all(row.passed for row in rows)
+    assert not check.pool(rows).passed
+    assert check.pool(rows[:1]).passed
+
+
+def test_pool_of_nothing_fails():
+    """No flights, no pass."""
+    for pooled in ("rms", "worst", "count"):
+        assert not check_of(1.0, pooled=pooled).pool([]).passed
+
+
+@pytest.mark.parametrize("per_flight", [3.9, LOOSEST * 4.0 + 0.1])
+def test_check_with_a_per_flight_limit_out_of_bounds_is_refused(per_flight):
+    """Neither tighter than the pooled limit nor more than 1.5 times as loose."""
+    with pytest.raises(ValueError, match=r"per_flight_limit .* must be between"):
+        check_of(1.0, per_flight_limit=per_flight)
+    with pytest.raises(ValueError, match=r"per_flight_limit"):
+        check_of(1.0, sense=">=", per_flight_limit=4.1)
+
+
+def test_check_without_a_finite_limit_is_refused():
+    """A limit that nothing can break is none."""
+    with pytest.raises(ValueError, match="must be a finite number"):
+        check_of(1.0, limit=math.inf)
+
+
+@pytest.mark.parametrize("outcome", list(Outcome))
+def test_survived_passes_completed_flights_only(outcome):
+    """Ground contact, a failed estimator and an interrupted flight all fail."""
+    flight = Flight(Log.empty(1), 0.02, 0.0, outcome, "course")
+    assert SURVIVED.judge(flight).passed is (outcome == Outcome.COMPLETED)

@@ -1,0 +1,133 @@
+"""The verdict as JSON, JUnit XML and Markdown, and its exit code."""
+
+import json
+import math
+from xml.etree import ElementTree
+
+import pytest
+
+from autopilot.interface import Mode, Setpoint
+from autopilot.pilot import Script, Timed
+from scenarios.harness.checks import SURVIVED, Check
+from scenarios.harness.config import FlightConfig
+from scenarios.harness.metrics import Measured
+from scenarios.harness.scenario import Scenario
+from scenarios.harness.verdict import Verdict, judge
+from sim.log import Flight, Log, Outcome, Phase
+
+
+def scenario_of(name="level"):
+    """A scenario that wants a tilt, read from the message of the made-up flights, of at most 4 degrees pooled."""
+    tilt = Check("tilt RMS", "deg", lambda f: Measured(f.manifest["tilt"]), 4.0, pooled="rms", per_flight_limit=6.0)
+    script = Script([Timed(0.0, Setpoint(Mode.STABILISE))])
+    return Scenario(name, "", FlightConfig(), lambda _config: script, (SURVIVED, tilt))
+
+
+def flown(tilt, seed=0, outcome=Outcome.COMPLETED, message="", estimator="premerlani"):
+    """A flight of one tick whose manifest says what its tilt is."""
+    log = Log.empty(1)
+    log.truth["R_eb"], log.truth["phase"] = log.flown["R_eb"], Phase.FLYING
+    config = FlightConfig(seed=seed, estimator=estimator).model_dump(mode="json")
+    return Flight(log, 0.02, 0.0, outcome, "course", message, manifest={"config": config, "tilt": tilt})
+
+
+def verdict_of(*flights, scenario=None):
+    """The verdict on flights of one scenario."""
+    scenario = scenario or scenario_of()
+    return Verdict.of((scenario, judge(scenario, flight)) for flight in flights)
+
+
+def test_verdict_on_good_flights_passes_with_exit_code_0():
+    """3 and 4 degrees are within 6 each, and sqrt((9 + 16) / 2) = 3.54 within 4 together."""
+    verdict = verdict_of(flown(3.0), flown(4.0, seed=1))
+    assert verdict.passed
+    assert verdict.exit_code == 0
+    assert verdict.pooled[0].rows[1].measured == pytest.approx(math.sqrt(12.5), rel=1e-15)
+
+
+def test_verdict_gates_the_pooled_value_too():
+    """Each flight within its own limit of 6, together above 4: exit code 1."""
+    verdict = verdict_of(flown(3.0), flown(5.0, seed=1))
+    assert all(flight.passed for flight in verdict.flights)
+    assert not verdict.passed
+    assert verdict.exit_code == 1
+
+
+def test_verdict_gates_each_flight_too():
+    """One at 7 among many at 0 pools to 2.2 and still fails."""
+    verdict = verdict_of(flown(7.0), *(flown(0.0, seed=seed) for seed in range(1, 10)))
+    assert verdict.pooled[0].passed
+    assert verdict.exit_code == 1
+
+
+def test_verdict_on_nothing_fails():
+    """A gate that judged no flight is shut."""
+    assert verdict_of().exit_code == 1
+
+
+@pytest.mark.parametrize(
+    ("outcome", "code"),
+    [(Outcome.DIVERGED, 3), (Outcome.GROUND_CONTACT, 1), (Outcome.ESTIMATOR_FAILED, 1), (Outcome.COMPLETED, 0)],
+)
+def test_exit_code_tells_a_blow_up_from_a_failed_check(outcome, code):
+    """A crash is a result; a simulation that blew up is not."""
+    assert verdict_of(flown(1.0, outcome=outcome)).exit_code == code
+
+
+def test_verdict_pools_each_scenario_and_estimator_apart():
+    """Flights of two estimators are never averaged."""
+    level, other = scenario_of(), scenario_of("other")
+    judged = [
+        (level, judge(level, flown(1.0))),
+        (level, judge(level, flown(9.0, estimator="gyro_only"))),
+        (other, judge(other, flown(1.0))),
+    ]
+    verdict = Verdict.of(judged)
+    pools = [(v.scenario, v.estimator, v.n_flights, v.passed) for v in verdict.pooled]
+    assert pools == [
+        ("level", "premerlani", 1, True),
+        ("level", "gyro_only", 1, False),
+        ("other", "premerlani", 1, True),
+    ]
+
+
+def test_json_holds_every_check_of_every_flight_and_pooled():
+    """The names and values that scripts rely on; what was not measured is null, and it is strict JSON."""
+    text = verdict_of(flown(3.0), flown(math.nan, seed=1)).to_json_text()
+    data = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert data["passed"] is False
+    first, second = data["flights"]
+    assert {k: first[k] for k in ("scenario", "estimator", "seed", "outcome", "passed")} == {
+        "scenario": "level", "estimator": "premerlani", "seed": 0, "outcome": "completed", "passed": True
+    }  # fmt: skip
+    assert first["checks"][1] == {
+        "name": "tilt RMS", "unit": "deg", "measured": 3.0, "sense": "<=", "limit": 6.0, "passed": True
+    }  # fmt: skip
+    assert second["checks"][1]["measured"] is None
+    assert second["checks"][1]["passed"] is False
+    (pooled,) = data["pooled"]
+    assert (pooled["scenario"], pooled["n_flights"], pooled["passed"]) == ("level", 2, False)
+    assert [c["limit"] for c in pooled["checks"]] == [2, 4.0]
+
+
+def test_junit_counts_what_it_holds_and_survives_any_message():
+    """As many cases and failures as the attributes say, from a message full of what XML forbids."""
+    verdict = verdict_of(flown(3.0), flown(7.0, 1, Outcome.ESTIMATOR_FAILED, 'Mine at 3 s: <"bad"> & \x00\x1b[0m'))
+    root = ElementTree.fromstring(verdict.to_junit())
+    (suite,) = root.findall("testsuite")
+    cases = suite.findall("testcase")
+    assert suite.get("tests") == str(len(cases)) == "6"
+    failing = [case for case in cases if case.find("failure") is not None]
+    assert suite.get("failures") == str(len(failing)) == "4"  # seed 1 and pooled, both checks
+    assert len({(case.get("classname"), case.get("name")) for case in cases}) == 6
+    assert '<"bad"> & ' in failing[0].find("failure").get("message")
+
+
+def test_markdown_shows_failed_flights_with_their_numbers():
+    """The pooled table always, a flight's own where it failed."""
+    text = verdict_of(flown(3.0), flown(7.0, 1, Outcome.GROUND_CONTACT)).to_markdown()
+    assert text.startswith("# Verdict: FAILED")
+    assert "## level, premerlani, 2 flights" in text
+    assert "| tilt RMS | 7 deg | <= 6 deg | **FAIL** |" in text
+    assert "### seed 1 flight 0: ground_contact" in text
+    assert "### seed 0" not in text
