@@ -13,11 +13,12 @@ help:  ## what can be made
 
 venv: $(STAMP)  ## set up .venv: the project, editable, with its development tools
 
-# Dependency groups need pip >= 25.1, which a system Python seldom brings.
+# Dependency groups need pip >= 25.1, which a system Python seldom brings; Debian's brings no pip for a venv at all.
 $(STAMP): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "wingslevel needs Python >= 3.11; name one with: make $(MAKECMDGOALS) PYTHON=python3.12" >&2; exit 1; }
-	$(PYTHON) -m venv $(VENV)
+	$(PYTHON) -m venv $(VENV) || $(PYTHON) -m venv --clear --without-pip $(VENV)
+	$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m pip --python $(BIN)/python install --quiet pip
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
 	$(BIN)/python -m pip install --quiet --editable . --group dev
 	@touch $@

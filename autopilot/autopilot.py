@@ -50,7 +50,7 @@ _STATE = np.dtype(
         ("mode", "i8"),  # of the last tick, -1 before the first
         ("roll_integral", "f8"),  # aileron and elevator held by the integrals
         ("pitch_integral", "f8"),
-        ("height_integral_rad", "f8"),  # pitch held by the integral of the height missing
+        ("climb_integral_rad", "f8"),  # pitch held by the integral of the climb missing
         ("unseen_turn_rad", "f8"),  # turned, but not yet in the GPS course
         ("outbound", "i8"),  # the launch point was passed and is being left behind
         ("felt_m_s2", "f8"),  # mean acceleration along the nose
@@ -73,7 +73,7 @@ def enter(mode, s):  # type: ignore[no-untyped-def]
     if mode in (RATE, LAUNCH) or s.mode == RATE:
         s.roll_integral = s.pitch_integral = 0.0
     if mode == LAUNCH:
-        s.felt_m_s2 = s.height_integral_rad = 0.0
+        s.felt_m_s2 = s.climb_integral_rad = 0.0
         s.thrown_s = -1.0
         s.levelled_off = 0
     s.outbound = 0

@@ -28,7 +28,7 @@ class GuidanceParams:
     climb_per_height_1_s, climb_limit_m_s, sink_limit_m_s : climb demanded per height missing, and its limits
     pitch_trim_rad : pitch of level flight at cruise       pitch_limit_rad : the steepest demanded
     throttle_trim, throttle_per_climb_s_m : for level flight, and per climb rate
-    pitch_per_height_rad_m_s, pitch_integral_limit_rad : integral of the height missing, and the most it holds
+    pitch_per_climb_rad_m, pitch_integral_limit_rad : integral of the climb missing, and the most it holds
     throttle_least : keeps air over the tail
     """
 
@@ -46,8 +46,8 @@ class GuidanceParams:
     pitch_limit_rad: float = math.radians(15.0)
     throttle_trim: float = 0.6
     throttle_per_climb_s_m: float = 0.085
-    pitch_per_height_rad_m_s: float = 0.002
-    pitch_integral_limit_rad: float = math.radians(8.0)
+    pitch_per_climb_rad_m: float = 0.01
+    pitch_integral_limit_rad: float = math.radians(10.0)
     throttle_least: float = 0.1
 
 
@@ -160,16 +160,16 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     cruise.  The integral takes up an estimate that is wrong in pitch; were it on the throttle, the speed
     would pay for that error.  Without a height: level flight at cruise.
 
-    height_m : demanded   row : measured   s : record with `height_integral_rad`, updated
+    height_m : demanded   row : measured   s : record with `climb_integral_rad`, updated
     """
     missing_m = height_m - height(row, p)
     climb_m_s = 0.0
     if math.isfinite(missing_m):
         climb_m_s = clip(p.climb_per_height_1_s * missing_m, -p.sink_limit_m_s, p.climb_limit_m_s)
-        if abs(missing_m) < 10.0:
-            integral_rad = s.height_integral_rad + p.pitch_per_height_rad_m_s * missing_m * dt_s
-            s.height_integral_rad = clip(integral_rad, -p.pitch_integral_limit_rad, p.pitch_integral_limit_rad)
-    pitch_rad = p.pitch_trim_rad + climb_m_s / p.airspeed_m_s + s.height_integral_rad
+        climb_missing_m_s = clip(climb_m_s + row.gps_v_e_m_s[2], -5.0, 5.0)  # the velocity is down
+        integral_rad = s.climb_integral_rad + p.pitch_per_climb_rad_m * climb_missing_m_s * dt_s
+        s.climb_integral_rad = clip(integral_rad, -p.pitch_integral_limit_rad, p.pitch_integral_limit_rad)
+    pitch_rad = p.pitch_trim_rad + climb_m_s / p.airspeed_m_s + s.climb_integral_rad
     throttle = p.throttle_trim + p.throttle_per_climb_s_m * climb_m_s
     return clip(pitch_rad, -p.pitch_limit_rad, p.pitch_limit_rad), clip(throttle, p.throttle_least, 1.0)
 

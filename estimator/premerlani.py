@@ -101,7 +101,7 @@ class PremerlaniParams:
     gps_filter_s: float = 1.0
     gps_latency_s: float = 0.3
     rotate_history: bool = True
-    launch_gate: float = 0.3
+    launch_gate: float = 0.2
     turn_speed: bool = False
     min_speed_m_s: float = 3.0
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S

@@ -262,7 +262,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
     if speed_m_s > 0.1:
         from_deg = float(np.degrees(np.arctan2(-wind_e_m_s[1], -wind_e_m_s[0])) % 360.0)
         arrow = rr.Arrows3D(
-            vectors=[wind_e_m_s * 8.0], origins=[wind_e_m_s * -10.0], colors=_WIND, radii=1.0,
+            vectors=[wind_e_m_s * 16.0], origins=[wind_e_m_s * -20.0], colors=_WIND, radii=1.0,
             labels=f"wind {speed_m_s:.1f} m/s from {from_deg:.0f}°",
         )  # fmt: skip
         rec.log("world/wind", arrow, static=True)

@@ -49,7 +49,8 @@ def open_viewer(path: str | Path | None = None, *, web: bool = False) -> Viewer:
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         start_new_session=True,
     )  # fmt: skip
-    await_port(process, grpc_port)
+    for port in (grpc_port, web_port) if web else (grpc_port,):
+        await_port(process, port)
     address = f"http://127.0.0.1:{web_port}/?url={url.replace('+', '%2B')}" if web else None
     return Viewer(process, url, address)
 

@@ -83,7 +83,7 @@ def load_estimator(spec: str) -> "AttitudeEstimator":
     reference = heading_reference_of(estimator)
     if reference not in ("course", "nose"):
         raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
-    return estimator  # type: ignore[no-any-return]
+    return estimator
 
 
 def heading_reference_of(estimator: object) -> "HeadingReference":
@@ -97,7 +97,7 @@ def load_autopilot(spec: str, heading_reference: "HeadingReference" = "course") 
 
     heading_reference : of the estimator that it will steer on, handed to a class that asks for it by this name
     """
-    return _load(_AUTOPILOT, spec, heading_reference=heading_reference)  # type: ignore[no-any-return]
+    return _load(_AUTOPILOT, spec, heading_reference=heading_reference)
 
 
 def _installed(kind: _Kind) -> dict[str, EntryPoint]:

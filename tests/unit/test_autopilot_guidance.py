@@ -152,6 +152,20 @@ def test_hold_height_demands_a_limited_climb(height_m, climb_m_s):
     np.testing.assert_allclose(throttle, max(wanted, PARAMS.throttle_least), rtol=0, atol=1e-12)
 
 
+def test_hold_height_sinking_against_the_demand_raises_the_nose_slowly_up_to_a_limit():
+    """An estimate that reads too nose-high: the climb missing is integrated into the pitch, not the throttle."""
+    s, p, row = state(), record(), row_of(v_e_m_s=(12.6, 0.0, 1.0))  # at 50 m, and sinking at 1 m/s
+    row["gps_p_e_m"] = (0.0, 0.0, -51.3)  # 1.3 s ago
+    first_pitch, first_throttle = hold_height(50.0, row, s, p, 0.02)
+    for _ in range(49):
+        pitch, throttle = hold_height(50.0, row, s, p, 0.02)
+    np.testing.assert_allclose(pitch - first_pitch, 0.98 * PARAMS.pitch_per_climb_rad_m, rtol=0, atol=1e-12)
+    assert throttle == first_throttle
+    for _ in range(5000):
+        hold_height(50.0, row, s, p, 0.02)
+    assert s["climb_integral_rad"] == PARAMS.pitch_integral_limit_rad
+
+
 def test_hold_height_without_gps_is_level_flight_at_cruise():
     """No fix, no climb: trim pitch and trim throttle."""
     demand = hold_height(100.0, row_of(valid=0), state(), record(), 0.02)

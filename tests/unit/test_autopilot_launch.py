@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.autopilot import _PARAMS, _STATE, DcmAutopilot
-from autopilot.guidance import GuidanceParams, throttle_for
+from autopilot.guidance import GuidanceParams, hold_height, throttle_for
 from autopilot.interface import Mode, Setpoint
 from autopilot.launch import LaunchParams, climb_away, feel_throw
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
@@ -66,7 +66,7 @@ def test_feel_throw_push_of_2_75_g_is_felt_within_a_tenth_of_a_second(pitch_deg)
 
 
 def test_climb_away_follows_the_throw_from_no_power_to_the_height():
-    """Motor off in the hand and for the fingers, then full, then that of the climb; it ends below the height and stays ended."""
+    """Motor off in the hand, then full, then that of the climb, which ends below the height for good."""
     s, p, g = np.zeros(1, _STATE)[0], record("launch", PARAMS), record("guidance", GUIDANCE)
     row = np.zeros(1, MEASURED_DTYPE)[0]
     row["gps_valid"] = 1
@@ -78,13 +78,18 @@ def test_climb_away_follows_the_throw_from_no_power_to_the_height():
     assert at(-1.0, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
     assert at(0.05, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
     assert at(0.3, 1.7) == (PARAMS.climb_pitch_rad, 1.0)
-    assert at(PARAMS.full_throttle_s, 20.0) == (PARAMS.climb_pitch_rad, throttle_for(PARAMS.climb_pitch_rad, g))
+    assert at(PARAMS.full_throttle_s, 20.0) == (
+        PARAMS.climb_pitch_rad,
+        throttle_for(PARAMS.climb_pitch_rad, g),
+    )
     near_pitch, near_throttle = at(12.0, 49.0)
     assert near_pitch < PARAMS.climb_pitch_rad
     assert near_throttle < 1.0
     assert s["levelled_off"] == 1
-    pitch, _ = at(13.0, 40.0)  # below the height again: the height loop goes on, not the launch
-    assert pitch == min(GUIDANCE.pitch_trim_rad + 2.5 / GUIDANCE.airspeed_m_s, GUIDANCE.pitch_limit_rad)
+    s["climb_integral_rad"] = 0.0
+    pitch, throttle = at(13.0, 40.0)  # below the height again: the height loop goes on, not the launch
+    afresh = np.zeros(1, _STATE)[0]
+    assert (pitch, throttle) == hold_height(50.0, row, afresh, g, DT_S)
 
 
 def test_launch_mode_in_the_hand_keeps_motor_off_and_learns_nothing():

@@ -16,6 +16,20 @@ from sim import recording
 from sim.log import Outcome
 
 SHORT = ("fly", "hand_launch", "--no-rerun")
+DOUBTFUL = """
+import signal
+
+import numpy as np
+
+from estimator.interface import AttitudeEstimate
+
+
+class Doubtful:
+    def update(self, m):
+        if m.imu.t_s > 5.0:
+            signal.raise_signal(signal.SIGINT)
+        return AttitudeEstimate(np.eye(3))
+"""
 
 
 @pytest.fixture
@@ -135,6 +149,17 @@ def test_fly_estimator_that_prints_leaves_the_json_alone(capfd) -> None:
     stdout, stderr = capfd.readouterr()
     assert json.loads(stdout)["flights"][0]["outcome"] == "estimator_failed"
     assert "noise" in stderr
+
+
+def test_fly_interrupted_keeps_the_recording_up_to_there(here: Path, capsys) -> None:
+    """Ctrl-C in the middle of the air: exit code 130, and a whole recording of the part that was flown."""
+    Path("own.py").write_text(DOUBTFUL, encoding="utf-8")
+    assert run([*SHORT, "--estimator", "own.py:Doubtful"]) == 130
+    (folder,) = (here / "flights").iterdir()
+    flight = recording.load(folder)
+    assert flight.outcome == Outcome.INTERRUPTED
+    assert flight.log.truth["t_s"][-1] == pytest.approx(5.0, abs=0.05)
+    assert "interrupted" in capsys.readouterr().out
 
 
 def test_check_reports_are_the_same_on_any_number_of_workers(here: Path) -> None:
