@@ -30,6 +30,10 @@ of these are applied to its output at once (`rotate_history`; the loop then has 
 *Yaw lock.*  The cross product of Eqn 23 fades beyond 90 degrees of error and vanishes at 180.  Beyond 90 its
 sign is kept and its size is one.
 
+*No learning in turns.*  In a turn the course lags and the crab changes: the yaw error takes the sign of the turn,
+and so does the bank through which Eqn 24 passes it to the pitch axis.  Their product has one sign, left or right:
+an integral that kept running would learn it as an offset of the pitch gyro.
+
 *Launch gate.*  While the length of ``g_reference`` is not that of gravity, forward acceleration or a wrong speed
 is in it: no roll-pitch correction then.
 
@@ -82,6 +86,7 @@ class PremerlaniParams:
                                but accelerations and wind get in
     k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
     offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
+    integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
     gps_lag_filter : bool      compare the course with an equally late nose, restore the speed
     gps_filter_s : float       time constant of the receiver's velocity filter
     gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
@@ -97,6 +102,7 @@ class PremerlaniParams:
     k_p: float = 1.0
     k_i: float = 0.03
     offset_limit_rad_s: float = math.radians(6.0)
+    integrate_below_rad_s: float = math.radians(20.0)
     gps_lag_filter: bool = True
     gps_filter_s: float = 1.0
     gps_latency_s: float = 0.3
@@ -108,7 +114,9 @@ class PremerlaniParams:
     force_range_m_s2: float = FORCE_RANGE_M_S2
 
     def __post_init__(self) -> None:
-        positive = ("offset_limit_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2")
+        positive = (
+            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2",
+        )  # fmt: skip
         for f in fields(self):
             value = getattr(self, f.name)
             if f.name in positive:
@@ -303,7 +311,10 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         else:
             s.roll_pitch_b[0] = s.roll_pitch_b[1] = s.roll_pitch_b[2] = 0.0
         weigh(s.w_rp, s.roll_pitch_b, s.w_y, s.yaw_b, s.total_b)
-        feed_back(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
+        w = s.omega_b_rad_s
+        turning = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) >= s.integrate_below_rad_s
+        k_i = 0.0 if turning else s.k_i
+        feed_back(s.total_b, s.k_p, k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
     if s.rejected != before:
         return 2  # Health.POOR
     if not s.locked:

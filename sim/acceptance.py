@@ -85,13 +85,14 @@ def _as_floats(value: Any) -> Array:
 
 def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> None:
     """Write estimate `e` into row `k` of `flown`; Unusable where it is none."""
-    wind = _UNKNOWN_WIND if e.wind_e_m_s is None else e.wind_e_m_s
-    R_eb, omega, bias = e.R_eb, e.omega_b_rad_s, e.gyro_bias_b_rad_s
+    R_eb, omega, bias, wind, health = e
+    if wind is None:
+        wind = _UNKNOWN_WIND
     if not (R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray and R_eb.ndim == 2):
         R_eb, omega, bias, wind = _as_floats(R_eb), _as_floats(omega), _as_floats(bias), _as_floats(wind)
         if (R_eb.shape, omega.shape, bias.shape, wind.shape) != ((3, 3), (3,), (3,), (3,)):
             raise Unusable(_FAULTS[1])
-    fault = _record_estimate(flown, k, R_eb, omega, bias, wind, int(e.health))
+    fault = _record_estimate(flown, k, R_eb, omega, bias, wind, int(health))
     if fault:
         raise Unusable(_FAULTS[fault])
 

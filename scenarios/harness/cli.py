@@ -120,7 +120,7 @@ def fly(
     json_: JsonOption = None,
 ) -> int:
     """Fly a scenario once, record it, judge it."""
-    from scenarios.harness import single
+    from scenarios.harness import single, viewing
 
     named = {
         "estimator": estimator,
@@ -140,6 +140,8 @@ def fly(
             flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web)
         single.tell(flown)
         report(flown.to_json())
+    if flown.shown is not None:
+        viewing.stay(flown.shown.viewer)
     return flown.exit_code
 
 

@@ -21,12 +21,13 @@ INTERRUPTED = 130
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """A flight that was flown, recorded and judged."""
+    """A flight that was flown, recorded and judged; `shown` live, or not."""
 
     scenario: Scenario
     flight: Flight
     judged: FlightVerdict
     folder: Path
+    shown: viewing.RealTime | None = None
 
     @property
     def exit_code(self) -> int:
@@ -71,7 +72,7 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
     folder = recording.save(flight, _free_folder(into, scenario.name, config))
     if rerun:
         viewing.write_rerun(flight, folder)
-    return Flown(scenario, flight, judge(scenario, flight), folder)
+    return Flown(scenario, flight, judge(scenario, flight), folder, live_view)
 
 
 def tell(flown: Flown) -> None:

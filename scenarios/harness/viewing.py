@@ -61,9 +61,10 @@ def stay(viewer: "Viewer") -> None:
 
 
 class RealTime:
-    """Shows a flight in the viewer as it is flown, no faster than time passes."""
+    """Shows a flight in a viewer as it is flown, no faster than time passes."""
 
-    def __init__(self, view: "LiveView", rate_hz: int) -> None:
+    def __init__(self, viewer: "Viewer", view: "LiveView", rate_hz: int) -> None:
+        self.viewer = viewer
         self._view = view
         self._rate_hz = rate_hz
         self._began_s = time.monotonic()
@@ -83,11 +84,11 @@ def live(scenario: str, config: "FlightConfig", *, web: bool) -> RealTime:
     from scenarios.harness.plugins import heading_reference_of, load_estimator
     from sim import rerun_view
 
-    viewer = rerun_view.open_viewer(web=web)
-    if viewer.address is not None:
-        console.err().print(f"open {viewer.address}", soft_wrap=True)
     start = config.start
     held_s = start.hold_s + start.push_s if isinstance(start, HandThrowStart) else 0.0
     reference = heading_reference_of(load_estimator(config.estimator))
     manifest = {"scenario": scenario, "config": config.model_dump(mode="json")}
-    return RealTime(rerun_view.LiveView(viewer.url, manifest, held_s, reference), config.rates.imu_hz)
+    viewer = rerun_view.open_viewer(web=web)
+    if viewer.address is not None:
+        console.err().print(f"open {viewer.address}", soft_wrap=True)
+    return RealTime(viewer, rerun_view.LiveView(viewer.url, manifest, held_s, reference), config.rates.imu_hz)

@@ -181,11 +181,23 @@ def test_yaw_lock_from_any_heading_takes_less_than_20_s(off_deg, rotate_history)
 
 
 def test_yaw_lock_does_not_wind_the_integral_up():
-    """Two seconds at full strength are no gyro offset: the integral sees no more than the largest believable one."""
+    """Seconds at full strength are no gyro offset: the integral sees no more than the largest believable one."""
     rows, _ = turning(5.0, 0.0, heading_0=math.pi)
     bias = Premerlani().replay(rows)["gyro_bias_b_rad_s"]
     params = PremerlaniParams()
     assert np.abs(bias).max() < params.k_i / params.k_p * params.offset_limit_rad_s * 5.0
+
+
+@pytest.mark.parametrize(("bank_deg", "learns"), [(20.0, True), (35.0, False)])
+def test_turn_faster_than_20_deg_s_teaches_no_offset(bank_deg, learns):
+    """A wrong course in a turn, 30 degrees ahead: learnt as an offset at 16 deg/s, not at 31."""
+    rows, R = turning(30.0, bank_deg)
+    estimator = power_up(R[0])
+    estimator.replay(rows[:750])
+    before = estimator.snapshot()["omega_i_b"][0]
+    rows["gps_course_rad"] += math.radians(30.0)
+    estimator.replay(rows[750:])
+    assert np.any(estimator.snapshot()["omega_i_b"][0] != before) == learns
 
 
 def test_gps_lost_in_flight_coasts_on_gyros_and_says_so():
