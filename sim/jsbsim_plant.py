@@ -159,7 +159,7 @@ class Model:
         self.airframe: dict[str, Any] = tomllib.loads((self.folder / "airframe.toml").read_text())
         self.dt_s = 1.0 / physics_hz
         jsbsim.set_logger(_SILENT)  # anew for each model: JSBSim keeps a logger per thread
-        self.fdm = jsbsim.FGFDMExec(None)
+        self.fdm = jsbsim.FGFDMExec(str(self.folder))  # else it looks for its own data, and only in some installations
         self.fdm.set_dt(self.dt_s)  # before the model: the servos' lags are worked out while loading
         if not self.fdm.load_model_with_paths(aircraft, str(AIRCRAFT), str(self.folder), str(self.folder)):
             raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")

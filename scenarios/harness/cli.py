@@ -17,8 +17,8 @@ from typing import Annotated, Any
 import typer
 
 from scenarios.harness import console
+from scenarios.harness.console import INTERRUPTED, USAGE
 
-USAGE, INTERRUPTED = 2, 130
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
 
 app = typer.Typer(
@@ -51,13 +51,15 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     try:
-        return int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
+        code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
     except typer.TyperException as problem:
         console.error(problem.format_message())
         return USAGE
     except (typer.Abort, KeyboardInterrupt):
+        code = INTERRUPTED
+    if code == INTERRUPTED:
         console.error("interrupted")
-        return INTERRUPTED
+    return code
 
 
 @contextmanager
@@ -170,7 +172,7 @@ def check(
         gate.tell(verdict)
         if not whole:
             report(verdict.to_json() | {"passed": False, "interrupted": True})
-            raise typer.Abort
+            return INTERRUPTED
         _write(junit, verdict.to_junit)
         _write(markdown, verdict.to_markdown)
         report(verdict.to_json())

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from scenarios.harness.checks import Row
 
+USAGE, INTERRUPTED = 2, 130  # exit codes, beside those of a verdict
 WIDTH = 80
 
 

@@ -16,24 +16,22 @@ import importlib
 import importlib.util
 import inspect
 import sys
+from collections import ChainMap
 from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from autopilot import AUTOPILOTS
+from estimator import ESTIMATORS
 
 if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
     from autopilot.interface import Autopilot
     from estimator.interface import AttitudeEstimator, HeadingReference
 
-ESTIMATORS: Mapping[str, str] = MappingProxyType(
-    {
-        "premerlani": "estimator.premerlani:Premerlani",
-        "gyro_only": "estimator.baselines:GyroOnly",
-        "oracle": "sim.oracle:Oracle",
-    }
-)
-AUTOPILOTS: Mapping[str, str] = MappingProxyType({"dcm": "autopilot.autopilot:DcmAutopilot"})
+# The oracle sees the truth: it is not flight code and not in flight code's own registry.
+_ALL_ESTIMATORS = ChainMap(ESTIMATORS, {"oracle": "sim.oracle:Oracle"})
 
 
 class _Kind(NamedTuple):
@@ -45,7 +43,7 @@ class _Kind(NamedTuple):
     arguments: tuple[str, ...]
 
 
-_ESTIMATOR = _Kind("estimator", ESTIMATORS, "wingslevel.estimators", ("measurements",))
+_ESTIMATOR = _Kind("estimator", _ALL_ESTIMATORS, "wingslevel.estimators", ("measurements",))
 _AUTOPILOT = _Kind("autopilot", AUTOPILOTS, "wingslevel.autopilots", ("estimate", "measurements", "setpoint"))
 
 

@@ -16,8 +16,6 @@ from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Flight, Log, Outcome
 
-INTERRUPTED = 130
-
 
 @dataclass(frozen=True, slots=True)
 class Flown:
@@ -33,7 +31,7 @@ class Flown:
     def exit_code(self) -> int:
         """As of the command line."""
         if self.flight.outcome == Outcome.INTERRUPTED:
-            return INTERRUPTED
+            return console.INTERRUPTED
         return self._verdict.exit_code
 
     @property
