@@ -28,6 +28,7 @@ MUNK = 0.9  # k2 - k1 of a body nine times as long as wide (NACA TR-184)
 BODY_SIDE = 1.5  # K_i of DATCOM figure 5.2.1.1-7: wing high on the body
 SPANWISE, CHORDWISE = 7, 5  # panels in each section of a surface, and along the chord
 STEP_DEG = 1.0  # of the differences
+RATE = 0.02  # of the differences, as an angle at the wing tip or over half the chord
 NARROW_M = 0.01  # within which the aileron's deflection begins and ends
 
 
@@ -175,10 +176,10 @@ class Lattice:
 
     def run(
         self, alpha_deg: float | None = None, beta_deg: float = 0.0, rates: tuple[float, float, float] = (0, 0, 0),
-        tail_deg: float | None = 0.0, fin_deg: float | None = 0.0, aileron_deg: float = 0.0,
+        tail_deg: float | None = 0.0, fin_deg: float | None = 0.0, aileron_deg: float = 0.0, wing: bool = True,
     ) -> Array:  # fmt: skip
         """CL, CD, CY, Cl, Cm, Cn of the lattice; rates are p b / 2 V, q c / 2 V, r b / 2 V; None leaves a surface off."""
-        wings = [self._wing(aileron_deg)]
+        wings = [self._wing(aileron_deg)] if wing else []
         if tail_deg is not None:
             wings.append(self._tail(tail_deg))
         if fin_deg is not None:
@@ -194,6 +195,19 @@ class Lattice:
         ).run()  # fmt: skip
         return np.array([float(found[k]) for k in ("CL", "CD", "CY", "Cl", "Cm", "Cn")])
 
+    def _lateral(self, step: float, **disturbed: Any) -> tuple[Array, Array]:
+        """Derivatives of the whole aeroplane and of the fin alone.
+
+        The fin stands beside the tailplane but not in the wing's wake: the vortex of the lattice's root would lie in
+        the plane of the fin, and the sidewash hang on how close it happens to pass.
+        """
+
+        def change(**on: Any) -> Array:
+            return (self.run(**on, **disturbed) - self.run(**on)) / step
+
+        fin = change(wing=False) - change(wing=False, fin_deg=None)
+        return change(fin_deg=None) + fin, fin
+
     @cached_property
     def attached(self) -> Attached:
         """All coefficients of the attached flow, by differences."""
@@ -204,13 +218,13 @@ class Lattice:
         alpha = (sweep[2] - sweep[0]) / np.radians(a[2] - a[0])
         wing = [self.run(alpha_deg=x, tail_deg=None, fin_deg=None) for x in a[::2]]
         wing_alpha = (wing[1] - wing[0]) / np.radians(a[2] - a[0])
-        beta = (self.run(beta_deg=STEP_DEG) - base) / step
-        finless = (self.run(beta_deg=STEP_DEG, fin_deg=None) - self.run(fin_deg=None)) / step
-        p, q, r = ((self.run(rates=tuple(0.02 * np.eye(3)[i])) - base) / 0.02 for i in range(3))
-        finless_r = (self.run(rates=(0.0, 0.0, 0.02), fin_deg=None) - self.run(fin_deg=None)) / 0.02
+        beta, fin_beta = self._lateral(step, beta_deg=STEP_DEG)
+        p, _ = self._lateral(RATE, rates=(RATE, 0.0, 0.0))
+        q = (self.run(rates=(0.0, RATE, 0.0)) - base) / RATE
+        r, fin_r = self._lateral(RATE, rates=(0.0, 0.0, RATE))
         tail = (self.run(tail_deg=STEP_DEG) - base) / step
-        fin = (self.run(fin_deg=STEP_DEG) - base) / step
-        fin *= np.sign(-fin[2])  # nose to the right
+        fin = (self.run(wing=False, fin_deg=STEP_DEG) - self.run(wing=False)) / step
+        fin *= np.sign(fin[5])  # nose to the right
         aileron = (self.run(aileron_deg=-STEP_DEG) - base) / step if s.aileron_y_m else np.zeros(6)
         downwash = 1.0 - float((alpha[4] - wing_alpha[4]) / tail[4])
         body = 2.0 * MUNK * s.fuselage_volume_m3 / s.wing_area_m2
@@ -227,8 +241,8 @@ class Lattice:
             cl_q=q[0], cm_q=q[4] + tail[4] * lag,
             cy_beta=beta[2] - 2.0 * BODY_SIDE * s.fuselage_height_m * s.fuselage_width_m / s.wing_area_m2,
             roll_beta=beta[3] + self._wing_height(), yaw_beta=beta[5] - body / s.span_m,
-            fin_yaw_beta=beta[5] - finless[5],
-            roll_p=p[3], yaw_p=p[5], roll_r=r[3], yaw_r=r[5], fin_yaw_r=r[5] - finless_r[5],
+            fin_yaw_beta=fin_beta[5],
+            roll_p=p[3], yaw_p=p[5], roll_r=r[3], yaw_r=r[5], fin_yaw_r=fin_r[5],
             cy_rudder=rudder * fin[2], roll_rudder=rudder * fin[3], yaw_rudder=rudder * fin[5],
             roll_aileron=flap * aileron[3], yaw_aileron=flap * aileron[5],
             cl_elevator=-elevator * tail[0], cm_elevator=-elevator * tail[4],
