@@ -115,13 +115,15 @@ class Lattice:
     def _wing(self, twist_deg: float) -> Any:
         """Tip to tip; `twist_deg` is the incidence that right (+) and left (-) gain along the aileron."""
         s, asb = self.shape, self.asb
-        stations = sorted({*s.panel_y_m, *((y + d) for y in s.aileron_y_m for d in (0.0, NARROW_M))})
-        stations = [y for y in stations if y <= s.panel_y_m[-1]]
-        inner, outer = s.aileron_y_m if s.aileron_y_m else (np.inf, np.inf)
+        stations, (inner, outer) = set(s.panel_y_m), (np.inf, np.inf)
+        if twist_deg:
+            inner, outer = s.aileron_y_m
+            stations |= {inner, inner + NARROW_M, outer, outer + NARROW_M}
+        stations_m = sorted(stations)
         airfoil = asb.Airfoil(self.sections.wing)
         sections = []
-        for y in [-y for y in stations[:0:-1]] + stations:
-            along = inner + NARROW_M <= abs(y) <= outer
+        for y in [-y for y in stations_m[:0:-1]] + stations_m:
+            along = inner < abs(y) <= outer
             chord = float(s.chord_at(np.array(y)))
             sections.append(
                 asb.WingXSec(
@@ -225,7 +227,9 @@ class Lattice:
         tail = (self.run(tail_deg=STEP_DEG) - base) / step
         fin = (self.run(wing=False, fin_deg=STEP_DEG) - self.run(wing=False)) / step
         fin *= np.sign(fin[5])  # nose to the right
-        aileron = (self.run(aileron_deg=-STEP_DEG) - base) / step if s.aileron_y_m else np.zeros(6)
+        aileron = np.zeros(6)
+        if s.aileron_y_m:
+            aileron = (self.run(aileron_deg=-STEP_DEG) - self.run(aileron_deg=STEP_DEG)) / (2.0 * step)
         downwash = 1.0 - float((alpha[4] - wing_alpha[4]) / tail[4])
         body = 2.0 * MUNK * s.fuselage_volume_m3 / s.wing_area_m2
         elevator, rudder, flap = (flap_effectiveness(x) for x in (s.elevator_part, s.rudder_part, s.aileron_part))
