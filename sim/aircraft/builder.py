@@ -27,7 +27,9 @@ from sim.aircraft.stall import Polars
 AIR_RATES = ("gust/p-rad_sec", "gust/q-rad_sec", "gust/r-rad_sec")
 
 ALPHA_DEG = np.concatenate([np.arange(-180, -25, 5), np.arange(-25, 26, 1), np.arange(30, 181, 5)]).astype(float)
-ROLLING_DEG = np.concatenate([np.arange(-180, -25, 15), np.arange(-24, 0, 2), np.arange(0, 25, 1), np.arange(30, 181, 15)])
+ROLLING_DEG = np.concatenate(
+    [np.arange(-180, -25, 15), np.arange(-24, 0, 2), np.arange(0, 25, 1), np.arange(30, 181, 15)]
+)
 HELIX = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 1.0, 2.0, 4.0])
 PROFILE_DEG = np.arange(-12.0, 15.0, 1.0)
 FOLDED_J = 5.0  # advance ratio at the end of the propeller's tables, beyond which it counts as stopped
@@ -35,11 +37,8 @@ FOLDED_J = 5.0  # advance ratio at the end of the propeller's tables, beyond whi
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Throws in degrees, and what part of the effect in theory a surface with its gap has."""
+    """effectiveness : part of the effect in theory; aileron_stalled : part left on a stalled wing."""
 
-    elevator_deg: float
-    rudder_deg: float
-    aileron_deg: float = 0.0
     effectiveness: float = 0.8
     aileron_stalled: float = 0.4
 
@@ -100,13 +99,13 @@ class Design:
     about: str
     sections: Sections
     parts: tuple[Part, ...]
-    surfaces: Surfaces
     cruise_m_s: float
     cruise_rad: float
     stall_m_s: float
     cd_extra: float
     cd_lift: float
     drive: Drive | None = None
+    surfaces: Surfaces = Surfaces()
     servos: Servos = Servos()
     ground: Ground = Ground()
 
@@ -152,7 +151,7 @@ def _common(d: Design) -> list[str]:
         product("aero/sin-beta", sin_b),
         product("aero/cos-beta", cos_b),
         product("aero/cos2-beta", cos_b, cos_b, about="flow along the span makes no lift: the tables see the rest"),
-        product("aero/cos-alpha", apply("cos", "aero/alpha-rad"), about="tail surfaces work backwards in reversed flow"),
+        product("aero/cos-alpha", apply("cos", "aero/alpha-rad"), about="tail surfaces work backwards in reverse"),
         product("aero/dihedral-shape", table("aero/alpha-deg", ALPHA_DEG, p.dihedral_shape(alpha)),
                 about="dihedral effect, over the attached value"),
     ]  # fmt: skip
@@ -181,7 +180,9 @@ def _slipstream(d: Design) -> list[str]:
         root = apply("sqrt", apply("product", "aero/qbar-psf", f"aero/{name}-qbar-psf"))
         blocks += [
             function(f"aero/{name}-qbar-psf", both, "with the slipstream"),
-            function(f"aero/{name}-wash-psf", apply("difference", root, "aero/qbar-psf"), "its gain for the cross flow"),
+            function(
+                f"aero/{name}-wash-psf", apply("difference", root, "aero/qbar-psf"), "its gain for the cross flow"
+            ),
         ]
     return blocks
 
@@ -191,8 +192,8 @@ def _aerodynamics(d: Design) -> str:
     a, s = d.attached, d.surfaces
     alpha = np.radians(ALPHA_DEG)
     cl, cd, cm = d.polars.lift_drag_pitch(alpha)
-    elevator = np.radians(s.elevator_deg) * s.effectiveness
-    rudder = np.radians(s.rudder_deg) * s.effectiveness
+    elevator = np.radians(d.shape.elevator_throw_deg) * s.effectiveness
+    rudder = np.radians(d.shape.rudder_throw_deg) * s.effectiveness
     area, span, chord = "metrics/Sw-sqft", "metrics/bw-ft", "metrics/cbarw-ft"
     force = ("aero/qbar-psf", area)
     tail_q, fin_q = ("aero/tail-qbar-psf", "aero/fin-qbar-psf") if d.drive else ("aero/qbar-psf", "aero/qbar-psf")
@@ -221,7 +222,9 @@ def _aerodynamics(d: Design) -> str:
         ),
         axis(
             "SIDE",
-            product("aero/force/side-beta", *force, side, "aero/cos-beta", a.cy_beta, about="the same, across the wind"),
+            product(
+                "aero/force/side-beta", *force, side, "aero/cos-beta", a.cy_beta, about="the same, across the wind"
+            ),
             product("aero/force/side-rudder", fin_q, area, cos_a, "servo/rudder", a.cy_rudder * rudder),
         ),
         axis(
@@ -236,7 +239,9 @@ def _aerodynamics(d: Design) -> str:
             "PITCH",
             product("aero/moment/pitch-alpha", *pitch, "aero/cos2-beta", over_alpha(cm)),
             product("aero/moment/pitch-q", *pitch, c2v, q, a.cm_q),
-            product("aero/moment/pitch-elevator", tail_q, area, chord, cos_a, "servo/elevator", a.cm_elevator * elevator),
+            product(
+                "aero/moment/pitch-elevator", tail_q, area, chord, cos_a, "servo/elevator", a.cm_elevator * elevator
+            ),
             *_washed_pitch(d),
         ),
         axis(
@@ -256,7 +261,7 @@ def _ailerons(d: Design, name: str, slope: float) -> list[str]:
     moment = ("aero/qbar-psf", "metrics/Sw-sqft", "metrics/bw-ft")
     terms = []
     if d.shape.aileron_y_m:
-        full = slope * np.radians(d.surfaces.aileron_deg) * d.surfaces.effectiveness
+        full = slope * np.radians(d.shape.aileron_throw_deg) * d.surfaces.effectiveness
         terms.append(product(f"aero/moment/{name}-aileron", *moment, "servo/aileron", "aero/aileron-shape", full))
     if d.drive and name == "roll":
         about = "balances the motor's torque in the cruise"
@@ -382,7 +387,12 @@ def _flight_control(d: Design) -> str:
     )
     properties = ["servo/aileron", "servo/elevator", "servo/rudder", *AIR_RATES]
     if d.drive is None:
-        properties += ["propulsion/engine/propeller-rpm", "propulsion/engine/thrust-lbs", "fcs/throttle-cmd-norm", "fcs/throttle-pos-norm"]
+        properties += [
+            "propulsion/engine/propeller-rpm",
+            "propulsion/engine/thrust-lbs",
+            "fcs/throttle-cmd-norm",
+            "fcs/throttle-pos-norm",
+        ]
     else:
         surfaces += f"""
     <actuator name="speed-controller">

@@ -149,9 +149,7 @@ class Lattice:
 
     def _plate(self, name: str, edge: list[tuple[float, float, float]], chord_m: float, twist_deg: float) -> Any:
         airfoil = self.asb.Airfoil(self.sections.tail)
-        sections = [
-            self.asb.WingXSec(xyz_le=list(at), chord=chord_m, twist=twist_deg, airfoil=airfoil) for at in edge
-        ]
+        sections = [self.asb.WingXSec(xyz_le=list(at), chord=chord_m, twist=twist_deg, airfoil=airfoil) for at in edge]
         return self.asb.Wing(name=name, xsecs=sections)
 
     def _fuselage(self) -> Any:
@@ -180,7 +178,7 @@ class Lattice:
         self, alpha_deg: float | None = None, beta_deg: float = 0.0, rates: tuple[float, float, float] = (0, 0, 0),
         tail_deg: float | None = 0.0, fin_deg: float | None = 0.0, aileron_deg: float = 0.0, wing: bool = True,
     ) -> Array:  # fmt: skip
-        """CL, CD, CY, Cl, Cm, Cn of the lattice; rates are p b / 2 V, q c / 2 V, r b / 2 V; None leaves a surface off."""
+        """CL, CD, CY, Cl, Cm, Cn of the lattice; rates p b / 2 V, q c / 2 V, r b / 2 V; None leaves a surface off."""
         wings = [self._wing(aileron_deg)] if wing else []
         if tail_deg is not None:
             wings.append(self._tail(tail_deg))
@@ -230,6 +228,7 @@ class Lattice:
         aileron = np.zeros(6)
         if s.aileron_y_m:
             aileron = (self.run(aileron_deg=-STEP_DEG) - self.run(aileron_deg=STEP_DEG)) / (2.0 * step)
+        polar = np.polyfit(sweep[:, 0], sweep[:, 1], 2)
         downwash = 1.0 - float((alpha[4] - wing_alpha[4]) / tail[4])
         body = 2.0 * MUNK * s.fuselage_volume_m3 / s.wing_area_m2
         elevator, rudder, flap = (flap_effectiveness(x) for x in (s.elevator_part, s.rudder_part, s.aileron_part))
@@ -241,7 +240,7 @@ class Lattice:
             cm_zero=base[4] - alpha[4] * at, cm_alpha=alpha[4] + body / s.chord_m,
             wing_cl_zero=wing[0][0] - wing_alpha[0] * np.radians(a[0]), wing_cl_alpha=wing_alpha[0],
             tail_alpha=alpha[0] - wing_alpha[0], tail_incidence=tail[0], downwash=downwash,
-            induced=tuple(float(x) for x in np.polyfit(sweep[:, 0], sweep[:, 1], 2)),
+            induced=(float(polar[0]), float(polar[1]), float(polar[2])),
             cl_q=q[0], cm_q=q[4] + tail[4] * lag,
             cy_beta=beta[2] - 2.0 * BODY_SIDE * s.fuselage_height_m * s.fuselage_width_m / s.wing_area_m2,
             roll_beta=beta[3] + self._wing_height(), yaw_beta=beta[5] - body / s.span_m,

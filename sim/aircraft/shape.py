@@ -4,7 +4,7 @@ Body axes, origin at the centre of gravity: x forward, y right, z down, metres.
 """
 
 import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,8 +23,10 @@ class Shape:
     panel_y_m : (n + 1,) where the right wing's panels begin and end, along the span as seen from above
     panel_chord_m : (n + 1,) chords there        panel_dihedral_deg : (n,) angle of each panel with the horizontal
     wing_x_m, wing_z_m : quarter chord of the root        tail_arm_m : back to the quarter chord of tail and fin
-    fuselage_z_m : middle of its height at the wing    tail_z_m : of the tailplane and the foot of the fin    aileron_y_m : (2,) where the right one begins and ends
+    fuselage_z_m : middle of its height at the wing       tail_z_m : of the tailplane and the foot of the fin
+    aileron_y_m : (2,) where the right one begins and ends, or empty
     elevator_part, rudder_part, aileron_part : of the chord that moves; 0 is none
+    elevator_throw_deg, rudder_throw_deg, aileron_throw_deg : from the middle to the stop
     """
 
     span_m: float
@@ -48,17 +50,21 @@ class Shape:
     rudder_part: float
     aileron_part: float
     aileron_y_m: tuple[float, ...]
+    elevator_throw_deg: float
+    rudder_throw_deg: float
     propeller_diameter_m: float
+    aileron_throw_deg: float = 0.0
 
     @classmethod
     def of(cls, airframe: Path) -> "Shape":
         """From an airframe.toml; ValueError where a key is missing or the panels do not fit together."""
         table: dict[str, Any] = tomllib.loads(airframe.read_text(encoding="utf-8"))["geometry"]
-        missing = [f.name for f in fields(cls) if f.name not in table]
+        missing = [f.name for f in fields(cls) if f.name not in table and f.default is MISSING]
         if missing:
             raise ValueError(f"{airframe}: [geometry] lacks {', '.join(missing)}")
-        values = {f.name: table[f.name] for f in fields(cls)}
-        shape = cls(**{k: tuple(map(float, v)) if isinstance(v, list) else float(v) for k, v in values.items()})
+        values: dict[str, Any] = {f.name: table[f.name] for f in fields(cls) if f.name in table}
+        values = {k: tuple(map(float, v)) if isinstance(v, list) else float(v) for k, v in values.items()}
+        shape = cls(**values)
         y, n = shape.panel_y_m, len(shape.panel_dihedral_deg)
         if not (len(y) == len(shape.panel_chord_m) == n + 1 and y[0] == 0.0 and np.all(np.diff(y) > 0.0)):
             raise ValueError(

@@ -40,7 +40,8 @@ def plate_normal(alpha_rad: ArrayLike, aspect: float) -> Array:
 class Polars:
     """Coefficients of the whole aeroplane over all angles of attack.
 
-    profile_deg, profile_cd : (n,) drag without that of lift, attached; cd_extra and cd_lift (times CL^2) are what no outline shows
+    profile_deg, profile_cd : (n,) drag without that of lift, attached
+    cd_extra, cd_lift : drag that no outline shows; the second goes with CL^2
     section_limits : least and greatest lift coefficient of the wing's section
     """
 

@@ -8,7 +8,7 @@ The outline is in airframe.toml; PROVENANCE.md tells where each figure comes fro
 from pathlib import Path
 
 from sim.aircraft import builder
-from sim.aircraft.builder import Design, Drive, Surfaces
+from sim.aircraft.builder import Design, Drive
 from sim.aircraft.lattice import Sections
 from sim.aircraft.masses import Box, Spread
 
@@ -29,7 +29,6 @@ DESIGN = Design(
         Box("skid and hatch", 0.060, (0.100, 0.0, 0.070), (0.30, 0.03, 0.01)),
         Box("servos and receiver", 0.175, (-0.060, 0.0, 0.030), (0.15, 0.05, 0.04)),
     ),
-    surfaces=Surfaces(elevator_deg=17.0, rudder_deg=21.0, aileron_deg=24.0),
     cruise_m_s=12.6,
     cruise_rad=0.016,
     stall_m_s=7.0,

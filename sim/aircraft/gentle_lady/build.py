@@ -8,7 +8,7 @@ The outline is in airframe.toml; PROVENANCE.md tells where each figure comes fro
 from pathlib import Path
 
 from sim.aircraft import builder
-from sim.aircraft.builder import Design, Surfaces
+from sim.aircraft.builder import Design
 from sim.aircraft.lattice import Sections
 from sim.aircraft.masses import Box, Spread
 
@@ -27,7 +27,6 @@ DESIGN = Design(
         Box("battery", 0.090, (0.235, 0.0, 0.046), (0.06, 0.03, 0.03)),
         Box("nose lead", 0.086, (0.285, 0.0, 0.050), (0.03, 0.03, 0.03)),
     ),
-    surfaces=Surfaces(elevator_deg=15.0, rudder_deg=25.0),
     cruise_m_s=6.3,
     cruise_rad=0.035,
     stall_m_s=5.0,
