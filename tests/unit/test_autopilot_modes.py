@@ -73,9 +73,7 @@ def test_course_nose_estimator_crabs_into_the_wind():
     north = Setpoint(Mode.COURSE, course_rad=0.0)
     windy = estimate(wind=np.array([0.0, 5.0, 0.0]))
     assert DcmAutopilot(heading_reference="nose").update(windy, measurements(), north).bank_demand_rad < -0.1
-    assert (
-        DcmAutopilot(heading_reference="course").update(windy, measurements(), north).bank_demand_rad == 0.0
-    )
+    assert DcmAutopilot(heading_reference="course").update(windy, measurements(), north).bank_demand_rad == 0.0
 
 
 def test_return_heading_away_turns_back_at_the_limit_and_heading_home_flies_straight():
@@ -114,9 +112,7 @@ def test_mode_change_out_of_rate_forgets_the_integral_of_the_manoeuvre():
     pull = Setpoint(Mode.RATE, rate_b_rad_s=(0.0, 0.3, 0.0))
     for _ in range(100):
         autopilot.update(LEVEL, measurements(), pull)
-    assert autopilot.update(LEVEL, measurements(), level) == DcmAutopilot().update(
-        LEVEL, measurements(), level
-    )
+    assert autopilot.update(LEVEL, measurements(), level) == DcmAutopilot().update(LEVEL, measurements(), level)
 
 
 def test_setpoint_throttle_overrides_the_autopilot_where_given():
@@ -134,7 +130,7 @@ def test_heading_reference_unknown_is_refused():
 
 def test_params_reach_the_kernel():
     """Every group of parameters is packed where the kernel reads it."""
-    params = AutopilotParams(StabiliseParams(aileron_per_roll_rate_s=0.0, aileron_per_rate_error_s=0.0))
+    params = AutopilotParams(StabiliseParams(roll_control_per_rate_s=0.0, roll_control_per_rate_error_s=0.0))
     banked = estimate(roll=0.5)
     setpoint = Setpoint(Mode.STABILISE)
     assert DcmAutopilot(params).update(banked, measurements(), setpoint).aileron == 0.0
@@ -142,13 +138,25 @@ def test_params_reach_the_kernel():
     assert DcmAutopilot(trimmed).update(LEVEL, measurements(), setpoint).aileron == 0.125
 
 
-@pytest.mark.parametrize("limit", [1.0, 0.5])
-def test_mix_beyond_the_limits_is_held(limit):
-    """Surfaces stay within their share of the travel, the throttle within 0..1."""
+def mixed(control, **params):
     p = np.zeros(1, _PARAMS["mixer"])
-    p[0] = astuple(MixerParams(surface_limit=limit))
-    assert mix(9.0, -9.0, 9.0, 9.0, p[0]) == (limit, -limit, limit, 1.0)
-    assert mix(-9.0, 9.0, -9.0, -9.0, p[0]) == (-limit, limit, -limit, 0.0)
+    p[0] = astuple(MixerParams(**params))
+    return mix(*control, p[0])
+
+
+@pytest.mark.parametrize("limits", [(1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.7, 0.8), (0.0, 1.0, 1.0, 0.0)])
+def test_mix_beyond_the_limits_is_held(limits):
+    """Each surface stays within its share of the travel, the throttle between 0 and its own; 0 is not fitted."""
+    names = ("aileron_limit", "elevator_limit", "rudder_limit", "throttle_limit")
+    params = dict(zip(names, limits, strict=True))
+    aileron, elevator, rudder, throttle = limits
+    assert mixed((9.0, -9.0, 9.0, 9.0), **params) == (aileron, -elevator, rudder, throttle)
+    assert mixed((-9.0, 9.0, -9.0, -9.0), **params) == (-aileron, elevator, -rudder, 0.0)
+
+
+def test_mix_without_ailerons_roll_control_is_rudder_to_the_same_side():
+    """Nose right slips to the left, and the dihedral rolls out of the slip, to the right."""
+    assert mixed((0.4, 0.0, 0.1, 0.0), aileron_limit=0.0, rudder_per_roll=1.0) == (0.0, 0.0, 0.5, 0.0)
 
 
 @pytest.mark.parametrize(
