@@ -25,8 +25,8 @@ class AutopilotParams:
     mixer: MixerParams = field(default_factory=MixerParams)
 
 
-_GLIDE_M_S = 7.0
-_GLIDE_PITCH_RAD = math.radians(-3.2)
+_GLIDE_M_S = 7.6
+_GLIDE_PITCH_RAD = math.radians(-4.5)
 
 _GENTLE_LADY = AutopilotParams(
     stabilise=StabiliseParams(
@@ -35,8 +35,8 @@ _GENTLE_LADY = AutopilotParams(
         roll_gain_1_s=1.0,
         roll_rate_limit_rad_s=0.4,
         roll_control_per_rate_s=0.9,
-        roll_control_per_rate_error_s=0.3,
-        roll_control_per_error=0.4,
+        roll_control_per_rate_error_s=0.5,
+        roll_control_per_error=0.2,
         pitch_gain_1_s=2.0,
         pitch_rate_limit_rad_s=0.5,
         elevator_per_pitch_rate_s=0.2,
@@ -50,7 +50,7 @@ _GENTLE_LADY = AutopilotParams(
         integral_limit=0.5,
     ),
     guidance=GuidanceParams(
-        bank_per_heading=0.8,
+        bank_per_heading=0.35,
         bank_limit_rad=math.radians(28.0),
         airspeed_m_s=_GLIDE_M_S,
         turn_back_m=45.0,
@@ -62,7 +62,7 @@ _GENTLE_LADY = AutopilotParams(
         pitch_per_climb_rad_m=0.0,
     ),
     launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),
-    mixer=MixerParams(rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
+    mixer=MixerParams(elevator_trim=-0.12, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
 )
 
 AIRFRAMES: Mapping[str, AutopilotParams] = MappingProxyType(

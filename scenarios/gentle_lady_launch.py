@@ -2,7 +2,7 @@
 
 =============  ===================================================================================================
 Story          Held for 8 s, swayed a little, while the gyro offset is measured in the first 2 s; then thrown level off
-               a slope, 30 m above the ground below, with a twist of the wrist.  There is no motor and there are no
+               a slope, 40 m above the ground below, with a twist of the wrist.  There is no motor and there are no
                ailerons: the autopilot levels the wings with the rudder and glides away straight ahead.
 Verifies       Premerlani & Bizard: a throw does not tip the matrix over as it does an accelerometer (Eqns 25-27), the
                heading is found from the GPS course by way of the yaw correction (Eqns 22-24), flying slowly
@@ -46,7 +46,7 @@ SCENARIO = Scenario(
     config=FlightConfig(
         aircraft="gentle_lady",
         duration_s=JUDGED_S,
-        start=HandThrowStart(height_m=30.0, pitch_deg=2.0),
+        start=HandThrowStart(height_m=40.0, pitch_deg=2.0),
         air=AirConfig(wind_m_s=2.0, wind_from_deg="random", turbulence_w20_m_s=3.0),
     ),
     script=_script,
