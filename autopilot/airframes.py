@@ -25,18 +25,18 @@ class AutopilotParams:
     mixer: MixerParams = field(default_factory=MixerParams)
 
 
-_GLIDE_M_S = 7.6
-_GLIDE_PITCH_RAD = math.radians(-4.5)
+_GLIDE_M_S = 7.4
+_GLIDE_PITCH_RAD = math.radians(-5.0)
 
 _GENTLE_LADY = AutopilotParams(
     stabilise=StabiliseParams(
         airspeed_m_s=_GLIDE_M_S,
         # Rudder, slip, roll: two lags of the Dutch roll (3 rad/s) lie between, so the bank is led slowly.
-        roll_gain_1_s=1.0,
-        roll_rate_limit_rad_s=0.4,
-        roll_control_per_rate_s=0.9,
+        roll_gain_1_s=1.8,
+        roll_rate_limit_rad_s=0.5,
+        roll_control_per_rate_s=1.2,
         roll_control_per_rate_error_s=0.5,
-        roll_control_per_error=0.2,
+        roll_control_per_error=0.1,
         pitch_gain_1_s=2.0,
         pitch_rate_limit_rad_s=0.5,
         elevator_per_pitch_rate_s=0.2,
@@ -47,7 +47,7 @@ _GENTLE_LADY = AutopilotParams(
         # The turn's own yaw rate is demanded: the damping holds the nose against the swing, not against the turn.
         rudder_per_yaw_rate_s=0.1,
         rudder_per_rate_error_s=0.3,
-        integral_limit=0.5,
+        integral_limit=0.12,
     ),
     guidance=GuidanceParams(
         bank_per_heading=0.35,
@@ -62,7 +62,7 @@ _GENTLE_LADY = AutopilotParams(
         pitch_per_climb_rad_m=0.0,
     ),
     launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),
-    mixer=MixerParams(elevator_trim=-0.12, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
+    mixer=MixerParams(elevator_trim=-0.2, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
 )
 
 AIRFRAMES: Mapping[str, AutopilotParams] = MappingProxyType(

@@ -9,8 +9,8 @@ Verifies       Premerlani & Bizard, steering by cross and dot product, with roll
 Aircraft       gentle_lady: two-metre sailplane, rudder and elevator, no motor
 Wind           2 m/s from any direction, turbulence W20 = 3 m/s
 Sensors        generic
-Passes when    it survives and passes within 25 m of the launch point in under 60 s; never with an angle of attack above
-               10 degrees or a bank above 45 degrees; from 20 s to the end inclination error at most 5 degrees RMS
+Passes when    it survives and passes within 25 m of the launch point in under 70 s; never with an angle of attack above
+               8 degrees (it stalls at 10) or a bank above 40 degrees; from 20 s to the end inclination error at most 5 degrees RMS
 =============  ===================================================================================================
 """
 
@@ -32,7 +32,7 @@ from scenarios.harness.metrics import (
 )
 from scenarios.harness.scenario import Scenario
 
-NEAR_M, SLOWEST_S = 25.0, 60.0
+NEAR_M, SLOWEST_S = 25.0, 70.0
 SETTLED = at(20.0)
 
 
@@ -45,7 +45,7 @@ SCENARIO = Scenario(
     story=__doc__,
     config=FlightConfig(
         aircraft="gentle_lady",
-        duration_s=90.0,
+        duration_s=80.0,
         start=InFlightStart(height_m=100.0, out_m=150.0),
         air=AirConfig(wind_m_s=2.0, wind_from_deg="random", turbulence_w20_m_s=3.0),
     ),
@@ -54,8 +54,8 @@ SCENARIO = Scenario(
     checks=(
         SURVIVED,
         Check("first within 25 m of the launch point", "s", pass_time_s(NEAR_M), SLOWEST_S),
-        Check("angle of attack", "deg", over(angle_of_attack_deg, highest, start, end), 10.0),
-        Check("bank", "deg", over(bank_deg, highest, start, end), 45.0),
+        Check("angle of attack", "deg", over(angle_of_attack_deg, highest, start, end), 8.0),
+        Check("bank", "deg", over(bank_deg, highest, start, end), 40.0),
         Check(
             "inclination error RMS",
             "deg",
