@@ -25,13 +25,15 @@ class AutopilotParams:
     mixer: MixerParams = field(default_factory=MixerParams)
 
 
+# Steeper than the best glide (6.3 m/s, pitch -2.6 degrees): nobody measures the airspeed, and an estimate that reads
+# 5 degrees too low in pitch would carry the best glide into the stall (4.6 m/s).
 _GLIDE_M_S = 7.4
 _GLIDE_PITCH_RAD = math.radians(-5.0)
 
 _GENTLE_LADY = AutopilotParams(
     stabilise=StabiliseParams(
         airspeed_m_s=_GLIDE_M_S,
-        # Rudder, slip, roll: two lags of the Dutch roll (3 rad/s) lie between, so the bank is led slowly.
+        # Rudder, slip, roll: the Dutch roll (a period of 1.6 s) lies between, so the bank is led slowly.
         roll_gain_1_s=1.8,
         roll_rate_limit_rad_s=0.5,
         roll_control_per_rate_s=1.2,
@@ -47,22 +49,24 @@ _GENTLE_LADY = AutopilotParams(
         # The turn's own yaw rate is demanded: the damping holds the nose against the swing, not against the turn.
         rudder_per_yaw_rate_s=0.1,
         rudder_per_rate_error_s=0.3,
+        # The elevator held is the angle of attack: no more of it than the best glide has, whatever pitch is believed.
         integral_limit=0.12,
     ),
     guidance=GuidanceParams(
-        bank_per_heading=0.35,
+        bank_per_heading=0.35,  # a slow aeroplane turns twice as quickly at the same bank, and banks more slowly
         bank_limit_rad=math.radians(28.0),
         airspeed_m_s=_GLIDE_M_S,
         turn_back_m=45.0,
+        # No height is worth a slower flight: the pitch is the glide's in every mode that would hold one.
         climb_per_height_1_s=0.0,
+        pitch_per_climb_rad_m=0.0,
         pitch_trim_rad=_GLIDE_PITCH_RAD,
         throttle_trim=0.0,
         throttle_per_climb_s_m=0.0,
         throttle_least=0.0,
-        pitch_per_climb_rad_m=0.0,
     ),
     launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),
-    mixer=MixerParams(elevator_trim=-0.2, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
+    mixer=MixerParams(elevator_trim=-0.12, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
 )
 
 AIRFRAMES: Mapping[str, AutopilotParams] = MappingProxyType(

@@ -10,7 +10,8 @@ Aircraft       gentle_lady: two-metre sailplane, rudder and elevator, no motor
 Wind           2 m/s from any direction, turbulence W20 = 3 m/s
 Sensors        generic
 Passes when    it survives and passes within 25 m of the launch point in under 70 s; never with an angle of attack above
-               8 degrees (it stalls at 10) or a bank above 40 degrees; from 20 s to the end inclination error at most 5 degrees RMS
+               8 degrees (it stalls at 10) or a bank above 40 degrees; from 20 s to the end inclination error at most 5
+               degrees RMS
 =============  ===================================================================================================
 """
 
@@ -21,7 +22,7 @@ from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
 from scenarios.harness.metrics import (
     angle_of_attack_deg,
     at,
-    bank_deg,
+    bank_size_deg,
     end,
     highest,
     inclination_error_deg,
@@ -45,7 +46,7 @@ SCENARIO = Scenario(
     story=__doc__,
     config=FlightConfig(
         aircraft="gentle_lady",
-        duration_s=80.0,
+        duration_s=75.0,
         start=InFlightStart(height_m=100.0, out_m=150.0),
         air=AirConfig(wind_m_s=2.0, wind_from_deg="random", turbulence_w20_m_s=3.0),
     ),
@@ -53,14 +54,14 @@ SCENARIO = Scenario(
     # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
-        Check("first within 25 m of the launch point", "s", pass_time_s(NEAR_M), SLOWEST_S),
-        Check("angle of attack", "deg", over(angle_of_attack_deg, highest, start, end), 8.0),
-        Check("bank", "deg", over(bank_deg, highest, start, end), 40.0),
+        Check("first within 25 m of the launch point", "s", pass_time_s(NEAR_M), SLOWEST_S),  # 43.9, 26.1 left
+        Check("angle of attack", "deg", over(angle_of_attack_deg, highest, start, end), 8.0),  # 3.3, 4.7 left
+        Check("bank", "deg", over(bank_size_deg, highest, start, end), 40.0),  # 34.3, 5.7 left
         Check(
             "inclination error RMS",
             "deg",
             over(inclination_error_deg, rms, SETTLED),
-            5.0,
+            5.0,  # 3.3, 1.7 left
             pooled="rms",
             per_flight_limit=7.5,
         ),

@@ -148,7 +148,7 @@ def height_m(flight: Flight) -> Series:
     return _series(flight, -flight.log.truth["p_e_m"][:, 2])
 
 
-def bank_deg(flight: Flight) -> Series:
+def bank_size_deg(flight: Flight) -> Series:
     """Size of the true bank angle, degrees."""
     R = flight.log.truth["R_eb"]
     return _series(flight, np.degrees(np.abs(np.arctan2(R[:, 2, 1], R[:, 2, 2]))))

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from autopilot.airframes import params_of
 from autopilot.autopilot import DcmAutopilot
@@ -24,13 +25,13 @@ LADY = params_of("gentle_lady")
 GLIDE = Setpoint(Mode.STABILISE, pitch_rad=LADY.guidance.pitch_trim_rad)
 
 
-def flown(start, script, duration_s, *, air=STILL, seed=0, suite="ideal", aircraft="endurance"):
+def flown(start, script, duration_s, *, air=STILL, seed=0, suite="ideal", aircraft="endurance", estimator=None):
     """Truth rows from the release on, which must all have been flown."""
     rates = Rates()
     plant = JsbsimPlant(aircraft, start=start, air=air, rates=rates, seed=seed)
     log = Log.empty(rates.ticks(plant.release_s + duration_s))
     autopilot = DcmAutopilot(heading_reference=Oracle.heading_reference, aircraft=aircraft)
-    flight = fly(plant, Suite(SUITES[suite], rates, seed), Oracle(), autopilot, Script(script), log)
+    flight = fly(plant, Suite(SUITES[suite], rates, seed), estimator or Oracle(), autopilot, Script(script), log)
     assert flight.outcome == Outcome.COMPLETED
     return flight.log.truth[rates.ticks(plant.release_s) :]
 
@@ -132,6 +133,27 @@ def test_sailplane_glide_settles_at_its_speed_with_wings_level():
     assert abs(bank_deg(truth)).max() < 1.0
     sink_m_s = -np.polyfit(truth["t_s"], height_m(truth), 1)[0]
     assert 0.4 < sink_m_s < 0.8
+
+
+class ReadsNoseLow(Oracle):
+    """The truth, but for a nose that seems lower than it is."""
+
+    def __init__(self, rad):
+        super().__init__()
+        self.error = Rotation.from_euler("Y", -rad).as_matrix()
+
+    def update(self, m):
+        truth = super().update(m)
+        return truth._replace(R_eb=truth.R_eb @ self.error)
+
+
+def test_sailplane_pitch_believed_too_low_is_slower_but_does_not_stall():
+    """8 degrees too low, it pulls; the elevator that it may hold ends at about the best glide, 6.3 m/s (stall: 4.6)."""
+    wrong = ReadsNoseLow(math.radians(8.0))
+    truth = flown(InFlight(0.0), [(0.0, Setpoint(Mode.COURSE))], 40.0, aircraft="gentle_lady", estimator=wrong)
+    assert truth["airspeed_m_s"][-1000:].min() > 5.5
+    assert truth["airspeed_m_s"][-1000:].max() < 0.95 * LADY.guidance.airspeed_m_s
+    assert np.degrees(truth["alpha_rad"]).max() < 6.0
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
