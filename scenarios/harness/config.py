@@ -78,6 +78,7 @@ class HandMotion(_Model):
 class HandThrowStart(_Model):
     """Start in a hand at the launch point, then thrown.
 
+    height_m : of the hand above the ground that is flown over: more than an arm's is a throw off a slope
     sway_deg_s : largest rate of the hand about each axis     release_rate_deg_s : sigma of the twist, each axis
     hand : "random" draws the motion from these two; a resolved configuration holds what was drawn
     calibration_s : from power-up, over which the gyro offset is measured in the hand
@@ -86,7 +87,7 @@ class HandThrowStart(_Model):
     kind: Literal["hand_throw"] = "hand_throw"
     heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
     pitch_deg: float = Field(default=15.0, ge=-30.0, le=60.0)
-    height_m: float = Field(default=1.7, gt=0.0, le=3.0)
+    height_m: float = Field(default=1.7, gt=0.0, le=300.0)
     hold_s: float = Field(default=8.0, gt=0.0, le=600.0)
     push_m_s2: float = Field(default=27.0, gt=0.0, le=100.0)
     push_s: float = Field(default=0.3, gt=0.0, le=2.0)

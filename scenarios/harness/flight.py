@@ -64,7 +64,7 @@ def fly_config(
     rates = config.rates.build()
     suite = Suite(suite_params(config.suite, config.sensors), rates, config.seed, config.flight)
     estimator = maker() if maker is not None else _estimator(config)
-    pilot = load_autopilot(config.autopilot, heading_reference_of(estimator))
+    pilot = load_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft)
     script = scenario.script(config)
     plant = JsbsimPlant(
         config.aircraft, start=start_of(config), air=air_of(config), rates=rates, seed=config.seed, flight=config.flight

@@ -8,7 +8,7 @@ A name is one of
 ``path/to/file.py:Class``  a file
 
 The class is called anew for each flight, without arguments (an autopilot's is given the ``heading_reference`` of the
-estimator where it asks for it).  Only ``update`` is required of it.
+estimator and the name of its ``aircraft`` where it asks for them).  Only ``update`` is required of it.
 """
 
 import difflib
@@ -90,12 +90,15 @@ def heading_reference_of(estimator: object) -> "HeadingReference":
     return reference
 
 
-def load_autopilot(spec: str, heading_reference: "HeadingReference" = "course") -> "Autopilot":
+def load_autopilot(
+    spec: str, heading_reference: "HeadingReference" = "course", aircraft: str = "endurance"
+) -> "Autopilot":
     """A new autopilot by name, ``module:Class`` or ``file.py:Class``; PluginError as for `load_estimator`.
 
-    heading_reference : of the estimator that it will steer on, handed to a class that asks for it by this name
+    heading_reference : of the estimator that it will steer on      aircraft : name of what it will fly; both are
+    handed to a class that asks for them by these names
     """
-    return _load(_AUTOPILOT, spec, heading_reference=heading_reference)
+    return _load(_AUTOPILOT, spec, heading_reference=heading_reference, aircraft=aircraft)
 
 
 def _installed(kind: _Kind) -> dict[str, EntryPoint]:
