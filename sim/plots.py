@@ -113,6 +113,20 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
     return {path: np.column_stack(lines) for path, lines in columns.items()}
 
 
+def limits(path: str, values: Array) -> tuple[float, float] | None:
+    """Range of the vertical axis that shows what matters in `values`, shape (ticks, lines); None for no data.
+
+    All of it; of an error 99 %, or the start, when nothing is known yet, would hide the rest.
+    """
+    found = values[np.isfinite(values)]
+    if len(found) == 0:
+        return None
+    kept = (0.5, 99.5) if path.endswith("error") else (0.0, 100.0)
+    low, high = np.percentile(found, kept)
+    margin = 0.06 * max(high - low, 1e-6)
+    return float(low - margin), float(high + margin)
+
+
 def _circle_deg(angle_rad: Array, cut_rad: float) -> Array:
     """Degrees from the cut once round, with a gap at every leap (no aeroplane turns 90 degrees in a tick)."""
     angle_deg = np.degrees((angle_rad - cut_rad) % (2.0 * np.pi) + cut_rad)
