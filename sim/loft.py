@@ -1,6 +1,6 @@
 """Closed surfaces skinned over rings of points, and the aerofoil sections that the rings of a wing are made of."""
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,18 +109,7 @@ def loft(rings: Array, *, closed: bool = False) -> Mesh:
             high -= 1
     end = np.array(zipped)
     vertices = np.vstack((rings.reshape(-1, 3), rings[0, :n], rings[-1, :n]))
-    return _finished(vertices, np.vstack((skin, end + s * k, end[:, ::-1] + s * k + n)))
-
-
-def disc(centre_m: tuple[float, float, float], radius_m: float) -> Mesh:
-    """Propeller disc: two very flat cones, rim to rim."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
-    rim = np.column_stack((np.zeros(48), radius_m * np.cos(angle), radius_m * np.sin(angle)))
-    hub = np.array([[0.01 * radius_m, 0.0, 0.0]])
-    here = np.arange(48)
-    fan = np.column_stack((np.zeros(48, int), 1 + here, 1 + np.roll(here, -1)))
-    vertices = np.vstack((hub, rim, -hub, rim)) + np.array(centre_m)
-    return _finished(vertices, np.vstack((fan, fan[:, ::-1] + 49)))
+    return finished(vertices, np.vstack((skin, end + s * k, end[:, ::-1] + s * k + n)))
 
 
 def signed_volume_m3(mesh: Mesh) -> float:
@@ -129,15 +118,7 @@ def signed_volume_m3(mesh: Mesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
-def superellipse(n: int, exponent: float) -> tuple[Array, Array]:
-    """Points round a rounded square of half side 1: across and down, the extremes among them where 4 divides `n`."""
-    angle = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)
-    across, down = (np.sign(f) * np.abs(f) ** (2.0 / exponent) for f in (np.cos(angle), np.sin(angle)))
-    across[np.abs(across) < 1e-9], down[np.abs(down) < 1e-9] = 0.0, 0.0
-    return across, down
-
-
-def _finished(vertices: Array, triangles: NDArray[np.int64]) -> Mesh:
+def finished(vertices: Array, triangles: NDArray[np.int64]) -> Mesh:
     """Mesh without triangles that are none or vertices that none uses, turned outward, with area-weighted normals."""
     corners = vertices[triangles]
     flat = np.any([np.all(corners[:, i] == corners[:, i - 1], axis=1) for i in range(3)], axis=0)

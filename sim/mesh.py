@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from estimator.interface import Array
-from sim.loft import Mesh, Section, disc, loft, section, superellipse
+from sim.fuselage import canopy, disc, fuselage, spinner
+from sim.loft import Mesh, Section, loft, section
 
 KEYS = (
     "wing_x_m", "wing_z_m", "fuselage_length_m", "nose_x_m", "fuselage_height_m", "fuselage_width_m",
@@ -27,40 +28,6 @@ THROW_DEG = 25.0  # of a control surface at full deflection, where the geometry 
 _PART = {"aileron": 0.24, "elevator": 0.40, "rudder": 0.45}
 _AILERON_SPAN = (0.54, 0.92)
 
-# Along the fuselage, nose to tail: fraction of the length, of the width, of the height; and how far the centre line
-# has risen to the tailplane.  With a motor in the nose, and without.
-_POWERED = np.array(
-    [
-        (0.000, 0.40, 0.34, 0.00),
-        (0.012, 0.52, 0.44, 0.00),
-        (0.045, 0.66, 0.58, 0.00),
-        (0.090, 0.80, 0.74, 0.00),
-        (0.150, 0.94, 0.90, 0.02),
-        (0.230, 1.00, 1.00, 0.00),
-        (0.340, 1.00, 1.00, 0.00),
-        (0.450, 0.86, 0.86, 0.14),
-        (0.600, 0.58, 0.58, 0.42),
-        (0.800, 0.36, 0.37, 0.80),
-        (0.960, 0.22, 0.24, 1.00),
-        (1.000, 0.10, 0.12, 1.04),
-    ]
-)
-_SAILPLANE = np.array(
-    [
-        (0.000, 0.10, 0.10, -0.30),
-        (0.008, 0.26, 0.24, -0.28),
-        (0.030, 0.46, 0.42, -0.22),
-        (0.080, 0.72, 0.66, -0.12),
-        (0.150, 0.92, 0.88, -0.02),
-        (0.230, 1.00, 1.00, 0.00),
-        (0.330, 1.00, 1.00, 0.00),
-        (0.450, 0.74, 0.80, 0.20),
-        (0.600, 0.46, 0.52, 0.52),
-        (0.800, 0.30, 0.36, 0.84),
-        (0.960, 0.22, 0.28, 1.00),
-        (1.000, 0.14, 0.20, 1.04),
-    ]
-)
 _TIP = np.array([(0.0, 1.0), (0.45, 0.955), (0.75, 0.82), (0.93, 0.60), (1.0, 0.34)])  # outward, chord left
 _SOFT_TIP = np.array([(0.0, 1.0), (0.5, 0.96), (0.8, 0.87), (0.95, 0.74), (1.0, 0.60)])  # of tailplane and fin
 _CLEAR_M = 0.0025  # between the ends of a control surface and what is beside it
@@ -132,13 +99,14 @@ def aeroplane(geometry: Mapping[str, Any]) -> dict[str, Part]:
     tail_z_m = float(geometry.get("tail_z_m", centre_z_m - 0.5 * half_height))
     parts = {
         **_wing(g, _panels(geometry), geometry),
-        "fuselage": Part(_fuselage(g, centre_z_m, tail_z_m)),
+        "fuselage": Part(fuselage(g, centre_z_m, tail_z_m)),
+        "canopy": Part(canopy(g, centre_z_m)),
         **_tailplane(g, tail_z_m, geometry),
         **_fin(g, tail_z_m, geometry),
     }
     radius_m = 0.5 * g["propeller_diameter_m"]
     if radius_m > 0.0:
-        parts["spinner"] = Part(_spinner((g["nose_x_m"], 0.0, centre_z_m), 0.16 * radius_m))
+        parts["spinner"] = Part(spinner((g["nose_x_m"], 0.0, centre_z_m), 0.16 * radius_m))
         parts["propeller"] = Part(disc((g["nose_x_m"], 0.0, centre_z_m), radius_m))
     return parts
 
@@ -291,7 +259,8 @@ def _tapered(
 def _tailplane(g: Mapping[str, float], tail_z_m: float, geometry: Mapping[str, Any]) -> dict[str, Part]:
     """Tailplane and the two halves of the elevator, which go up together."""
     part, throw_rad = _controlled(geometry, "elevator")
-    root, tip = np.array([-g["tail_arm_m"], 0.0, tail_z_m]), np.array([-g["tail_arm_m"], 0.5 * g["tail_span_m"], tail_z_m])
+    root = np.array([-g["tail_arm_m"], 0.0, tail_z_m])
+    tip = root + np.array([0.0, 0.5 * g["tail_span_m"], 0.0])
     right = _tapered(root, tip, g["tail_chord_m"], 0.92, part, _PART["elevator"], (0.0, 0.0, -1.0))
     if part == 0.0:
         return {"tailplane": Part(loft(_both(right, None)))}
@@ -314,27 +283,3 @@ def _fin(g: Mapping[str, float], tail_z_m: float, geometry: Mapping[str, Any]) -
         return {"fin": Part(loft(blade.fixed(None)))}
     cut = _RUDDER_FOOT, 1.0
     return {"fin": Part(loft(blade.fixed(cut))), "rudder": blade.hinged("rudder", cut, 1.0, throw_rad)}
-
-
-def _fuselage(g: Mapping[str, float], centre_z_m: float, tail_z_m: float) -> Mesh:
-    """Fuselage of rounded sections, its ends closed flat."""
-    across, down = superellipse(24, 2.5)
-    table = _POWERED if g["propeller_diameter_m"] > 0.0 else _SAILPLANE
-    half_width, half_height = 0.5 * g["fuselage_width_m"], 0.5 * g["fuselage_height_m"]
-    rings = []
-    for x, width, height, rise in table:
-        x_m = np.full(len(across), g["nose_x_m"] - x * g["fuselage_length_m"])
-        z_m = centre_z_m + half_height * height * down + rise * (tail_z_m - centre_z_m)
-        rings.append(np.column_stack((x_m, half_width * width * across, z_m)))
-    return loft(np.array(rings), closed=True)
-
-
-def _spinner(centre_m: tuple[float, float, float], radius_m: float) -> Mesh:
-    """Round cap in front of the propeller."""
-    across, down = superellipse(16, 2.0)
-    quarter = np.linspace(0.0, 0.45 * np.pi, 6)
-    rings = [
-        np.column_stack((np.full(16, 1.6 * radius_m * np.sin(a)), radius_m * np.cos(a) * across, radius_m * np.cos(a) * down))
-        for a in quarter
-    ]
-    return loft(np.array(rings) + np.array(centre_m), closed=True)

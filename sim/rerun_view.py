@@ -8,7 +8,7 @@ The estimated aeroplane is drawn at the true position, so that what one sees bet
 alone.  The chase view follows the path, not the nose: its horizon stays level, and bank and pitch are seen.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,10 +21,10 @@ from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 from autopilot.interface import Mode
 from estimator.interface import Array, HeadingReference, Health
 from estimator.rotation import from_euler
-from sim.log import Event, Flight, Log, Phase
 from sim.loft import Mesh
+from sim.log import Event, Flight, Log, Phase
 from sim.mesh import Part, aeroplane, geometry_of
-from sim.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, curves, limits
+from sim.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, Range, curves, limits
 from sim.recording import digest, replacing
 from sim.story import setting, story
 from sim.viewer import Viewer as Viewer
@@ -40,13 +40,13 @@ TIMELINE = "sim_time"
 CONTROLS = ("aileron", "elevator", "rudder")
 LAUNCH_LATITUDE_DEG, LAUNCH_LONGITUDE_DEG = 42.80, -73.95  # where the manifest names no other place
 
-_SKY: Colour = (30, 38, 50)
-_GROUND: Colour = (40, 50, 46)
-_GRID: Colour = (78, 94, 88)
+_SKY: Colour = (118, 146, 170)
+_GROUND: Colour = (66, 84, 66)
+_GRID: Colour = (92, 112, 90)
 _WIND: Colour = (120, 220, 230)
 _LARGE = 0.05  # the overview shows the aeroplane larger, by this times the reach in metres, or nobody would find it
 _WIDTHS = (2.4, 1.7, 1.2)  # of the lines of a plot: a lower one is seen beside those that cover it
-_TRACK_HZ = 25.0  # the drawn tracks
+_TRACK_HZ, _MAP_HZ = 25.0, 10.0  # the drawn tracks; the aeroplane on the map
 _STEP_RAD = np.radians(0.5)  # a control surface is drawn within this of where it is
 _GHOST, _THINNEST, _DENSER = 105, 10.0, 80.0  # opacity of 255: the estimate; the propeller at no throttle, more at full
 _PALE = 0.75
@@ -70,8 +70,8 @@ def write(flight: Flight, path: str | Path) -> Path:
     with replacing(path) as temporary:
         temporary.touch()  # a refusal is ours to word, not Rerun's
         rec = _stream(flight.manifest, digest(flight)[:16])
-        lines = curves(flight.log, flight.heading_reference)
-        rec.save(temporary, default_blueprint=_blueprint(flight.log, flight.release_s, lines))
+        lines = curves(flight.log, flight.heading_reference) if len(flight.log) else {}
+        rec.save(temporary, default_blueprint=_blueprint(flight.log, flight.release_s, limits(flight.log, lines)))
         _send_fixed(rec, scene)
         _send_rows(rec, scene, flight.log, lines, 0)
         _send_end(rec, flight)
@@ -195,8 +195,8 @@ def _painted(mesh: Mesh, name: str, colour: Colour, alpha: int | None = None) ->
     base = np.array(colour, np.float64)
     if name == "propeller":
         base = np.array([225.0, 225.0, 225.0])
-    elif name == "spinner":
-        base = 0.25 * base
+    elif name in ("spinner", "canopy"):
+        base = 0.15 * base + 0.1 * np.array([210.0, 225.0, 255.0])
     elif name == "fuselage" or name.startswith(CONTROLS):
         base = _PALE * np.array([244.0, 240.0, 232.0]) + (1.0 - _PALE) * base
     below = np.clip(mesh.normals[:, 2:], 0.0, 1.0) if name != "propeller" else 0.0
@@ -242,7 +242,10 @@ def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, lines: Mapping
     here = scene.lat_lon_deg(p_e_m)
     size = rr.Radius.ui_points(7.0)
     rec.log("map/aeroplane", rr.GeoPoints.from_fields(colors=TRUTH, radii=size), static=True)
-    rec.send_columns("map/aeroplane", when(new), rr.GeoPoints.columns(positions=here[new]))
+    every = _every(log, _MAP_HZ)
+    seldom = np.arange(start + -start % every, len(log), every)
+    if len(seldom):
+        rec.send_columns("map/aeroplane", when(seldom), rr.GeoPoints.columns(positions=here[seldom]))
     _send_tracks(rec, scene, log, here)
 
 
@@ -272,6 +275,11 @@ def _changes(values: NDArray[Any], start: int) -> NDArray[np.intp]:
     return changed[changed >= start]
 
 
+def _every(log: Log, rate_hz: float) -> int:
+    """How many rows lie between samples at about `rate_hz`."""
+    return max(1, round(1.0 / (rate_hz * max(float(log.measured["dt_s"][-1]), 1e-3))))
+
+
 def _ns(t_s: Array) -> NDArray[np.timedelta64]:
     """Seconds as whole nanoseconds, rounded, where Rerun would cut off."""
     return np.round(t_s * 1e9).astype("timedelta64[ns]")
@@ -281,7 +289,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
     """The way so far: truth, its shadow on the ground, the GPS fixes; and the mean wind at the launch point."""
     import rerun as rr
 
-    every = max(1, round(1.0 / (_TRACK_HZ * max(float(log.measured["dt_s"][-1]), 1e-3))))
+    every = _every(log, _TRACK_HZ)
     track = log.truth["p_e_m"][::every]
     thin = rr.Radius.ui_points(1.0)
     rec.log("world/truth/track", rr.LineStrips3D([track], colors=TRUTH, radii=rr.Radius.ui_points(1.5)), static=True)
@@ -300,7 +308,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
     if speed_m_s > 0.1:
         from_deg = float(np.degrees(np.arctan2(-wind_e_m_s[1], -wind_e_m_s[0])) % 360.0)
         arrow = rr.Arrows3D(
-            vectors=[wind_e_m_s * 16.0], origins=[wind_e_m_s * -20.0], colors=_WIND, radii=1.0,
+            vectors=[wind_e_m_s * 16.0], origins=[wind_e_m_s * -20.0 - [0.0, 0.0, 25.0]], colors=_WIND, radii=1.0,
             labels=f"wind {speed_m_s:.1f} m/s from {from_deg:.0f}°",
         )  # fmt: skip
         rec.log("world/wind", arrow, static=True)
@@ -329,10 +337,10 @@ def _send_end(rec: "rr.RecordingStream", flight: Flight) -> None:
     rec.log("story", rr.TextDocument(story(flight), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
-def _blueprint(log: Log | None, release_s: float, lines: Mapping[str, Array]) -> "rrb.Blueprint":
+def _blueprint(log: Log | None, release_s: float, ranges: Mapping[str, Range]) -> "rrb.Blueprint":
     """The layout: chase view, overview, story, events and map on the left; plots and states on the right.
 
-    log, lines : what overview and plots shall hold; None and empty for a flight that is still to come
+    log, ranges : what the overview and the axes of the plots shall hold; None and empty for a flight to come
     """
     import rerun as rr
     import rerun.blueprint as rrb
@@ -368,9 +376,9 @@ def _blueprint(log: Log | None, release_s: float, lines: Mapping[str, Array]) ->
         rrb.Horizontal(
             rrb.Vertical(chase, rrb.Horizontal(overview, words, column_shares=[5, 4]), row_shares=[3, 2]),
             rrb.Vertical(
-                rrb.Tabs(*(_page(name, plots, axis, lines) for name, plots in PAGES.items()), active_tab=0),
+                rrb.Tabs(*(_page(name, plots, axis, ranges) for name, plots in PAGES.items()), active_tab=0),
                 rrb.StateTimelineView(origin="/states", name="Phase, mode, estimator", time_view=axis),
-                row_shares=[6, 1],
+                row_shares=[9, 2],
             ),
             column_shares=[9, 8],
         ),
@@ -383,9 +391,7 @@ def _blueprint(log: Log | None, release_s: float, lines: Mapping[str, Array]) ->
     )
 
 
-def _page(
-    name: str, plots: Sequence[Plot], axis: "rrb.TimeAxis | None", lines: Mapping[str, Array]
-) -> "rrb.Vertical":
+def _page(name: str, plots: Sequence[Plot], axis: "rrb.TimeAxis | None", ranges: Mapping[str, Range]) -> "rrb.Vertical":
     """The plots of a page below one another; a legend where it differs from the one above."""
     import rerun.blueprint as rrb
 
@@ -394,7 +400,7 @@ def _page(
     for plot in plots:
         legend = rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=plot.curves != above)
         above = plot.curves
-        shown = limits(plot.path, lines[plot.path]) if plot.path in lines else None
+        shown = ranges.get(plot.path)
         axis_y = rrb.ScalarAxis(range=shown) if shown else None
         views.append(
             rrb.TimeSeriesView(
@@ -405,7 +411,7 @@ def _page(
     return rrb.Vertical(*views, row_shares=heights, name=name)
 
 
-def _height(shown: tuple[float, float] | None) -> float:
+def _height(shown: Range | None) -> float:
     """Height of a plot for its share of the page, in pixels: the viewer labels powers of ten 24 pixels apart."""
     frame, least = 46.0, 70.0
     if shown is None:
