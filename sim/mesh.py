@@ -82,7 +82,8 @@ def aeroplane(geometry: Mapping[str, Any]) -> dict[str, Part]:
     ----------
     geometry    the ``[geometry]`` table of an ``airframe.toml``.  ``wing_x_m``, ``wing_z_m`` place the quarter
                 chord of the wing root, ``tail_arm_m`` (positive aft) that of tailplane and fin, ``tail_z_m`` the
-                height of both; the fuselage runs aft from ``nose_x_m``, where the propeller turns.  The wing is
+                height of both; the fuselage, its middle at ``fuselage_z_m``, runs aft from ``nose_x_m``, where
+                the propeller turns.  The wing is
                 straight (``span_m``, ``root_chord_m``, ``tip_chord_m``, ``dihedral_deg``) or made of panels
                 (``panel_y_m`` and ``panel_chord_m`` at their ends, root first, ``panel_dihedral_deg`` of each).
                 ``aileron_part``, ``elevator_part``, ``rudder_part`` of the chord move, about hinges with
@@ -95,7 +96,9 @@ def aeroplane(geometry: Mapping[str, Any]) -> dict[str, Part]:
     """
     g = _checked(geometry)
     half_height = 0.5 * g["fuselage_height_m"]
-    centre_z_m = float(np.clip(0.0, g["wing_z_m"] - half_height, g["wing_z_m"] + half_height))  # it carries the wing
+    # Where nothing says how high the fuselage is, it carries the wing.
+    carries_z_m = float(np.clip(0.0, g["wing_z_m"] - half_height, g["wing_z_m"] + half_height))
+    centre_z_m = float(geometry.get("fuselage_z_m", carries_z_m))
     tail_z_m = float(geometry.get("tail_z_m", centre_z_m - 0.5 * half_height))
     parts = {
         **_wing(g, _panels(geometry), geometry),
@@ -206,7 +209,7 @@ def _controlled(geometry: Mapping[str, Any], control: str) -> tuple[float, float
     throw_deg = float(geometry.get(f"{control}_throw_deg", THROW_DEG))
     if not 0.0 <= part <= 0.8:
         raise ValueError(f"geometry {control}_part = {part:g} is not a part of the chord from 0 to 0.8")
-    if not 0.0 < throw_deg < 90.0:
+    if part > 0.0 and not 0.0 < throw_deg < 90.0:
         raise ValueError(f"geometry {control}_throw_deg = {throw_deg:g} is not an angle between 0 and 90 deg")
     return part, float(np.radians(throw_deg))
 

@@ -209,14 +209,14 @@ def latest(t_s, values, at_s):
     ],
 )  # fmt: skip
 def test_control_surface_is_shown_within_half_a_degree_of_the_truth(shown, flight, name, column, axis):
-    """At every tick, by what the viewer shows then; full deflection is 25 degrees, and the hinge stays in place."""
+    """At every tick, by what the viewer shows then, with the throw of the geometry; and the hinge stays in place."""
     entity = f"/world/truth/body/{name}"
     t_s, quaternion = shown.column(entity, "Transform3D:quaternion")
     _, translation_m = shown.column(entity, "Transform3D:translation")
     at_s = flight.log.truth["t_s"] - flight.release_s
     turned = Rotation.from_quat(latest(t_s, quaternion, at_s)[:, 0])
     drawn_deg = np.degrees(turned.magnitude() * np.sign(turned.as_rotvec() @ np.array(axis)))
-    true_deg = 25.0 * flight.log.truth[column]
+    true_deg = geometry_of("endurance").get(f"{column}_throw_deg", 25.0) * flight.log.truth[column]
     assert np.ptp(true_deg) > 2.0
     np.testing.assert_allclose(drawn_deg, true_deg, rtol=0, atol=0.5 + 1e-4)
     hinge_m = aeroplane(geometry_of("endurance"))[name].hinge.point_m

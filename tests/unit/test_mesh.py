@@ -1,13 +1,22 @@
 """The shape of the aeroplanes: closed parts, outward normals, the size the geometry says, hinges that turn aright."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from sim import aircraft as aircraft_package
 from sim.loft import section, signed_volume_m3
 from sim.mesh import KEYS, PANELS, STRAIGHT_WING, aeroplane, geometry_of
 
 ROUND_OFF_M = 1e-12  # a few operations on lengths of about a metre
+STRAIGHT = {
+    "span_m": 1.60, "root_chord_m": 0.26, "tip_chord_m": 0.2025, "dihedral_deg": 5.0, "wing_x_m": 0.012,
+    "wing_z_m": -0.045, "fuselage_length_m": 1.10, "nose_x_m": 0.40, "fuselage_height_m": 0.11,
+    "fuselage_width_m": 0.08, "tail_arm_m": 0.66, "tail_span_m": 0.52, "tail_chord_m": 0.13, "fin_height_m": 0.20,
+    "fin_chord_m": 0.16, "propeller_diameter_m": 0.254, "rudder_throw_deg": 20.0,
+}  # fmt: skip
 POLYHEDRAL = {
     "panel_y_m": [0.0, 0.56, 0.994], "panel_chord_m": [0.229, 0.229, 0.166], "panel_dihedral_deg": [5.0, 11.0],
     "wing_x_m": 0.022, "wing_z_m": -0.040, "fuselage_length_m": 1.04, "nose_x_m": 0.33, "fuselage_height_m": 0.085,
@@ -15,8 +24,8 @@ POLYHEDRAL = {
     "fin_height_m": 0.22, "fin_chord_m": 0.165, "elevator_part": 0.28, "rudder_part": 0.45, "aileron_part": 0.0,
     "propeller_diameter_m": 0.0,
 }  # fmt: skip
-POWERED = geometry_of("endurance")
-AEROPLANES = {"endurance": POWERED, "polyhedral": POLYHEDRAL}
+SHIPPED = sorted(path.parent.name for path in Path(aircraft_package.__file__).parent.glob("*/airframe.toml"))
+AEROPLANES = {"straight": STRAIGHT, "polyhedral": POLYHEDRAL, **{name: geometry_of(name) for name in SHIPPED}}
 MADE = {name: aeroplane(geometry) for name, geometry in AEROPLANES.items()}
 EVERY_PART = [(name, part) for name, parts in MADE.items() for part in parts]
 HINGED = [(name, part) for name, part in EVERY_PART if MADE[name][part].hinge]
@@ -34,6 +43,11 @@ def welded(mesh):
     """Triangles of the mesh over distinct points: vertices doubled at an edge are one again."""
     _, index = np.unique(np.round(mesh.vertices, 9), axis=0, return_inverse=True)
     return index[mesh.triangles]
+
+
+def throw_rad(aircraft, part):
+    """The deflection that the geometry asks for; 25 degrees where it says nothing."""
+    return np.radians(AEROPLANES[aircraft].get(f"{part.hinge.control}_throw_deg", 25.0))
 
 
 def moved(part, deflection):
@@ -95,8 +109,8 @@ def test_extents_equal_the_geometry(aircraft):
         if found:
             low[name], high[name] = np.vstack(found).min(axis=0), np.vstack(found).max(axis=0)
     size = {name: high[name] - low[name] for name in low}
-    span_m = geometry.get("span_m", 2.0 * geometry.get("panel_y_m", [0.0])[-1])
-    root_chord_m = geometry.get("root_chord_m", geometry.get("panel_chord_m", [0.0])[0])
+    span_m = 2.0 * geometry["panel_y_m"][-1] if "panel_y_m" in geometry else geometry["span_m"]
+    root_chord_m = geometry["panel_chord_m"][0] if "panel_y_m" in geometry else geometry["root_chord_m"]
     expected = [
         (size["wing"][1], span_m),
         (size["wing"][0], root_chord_m),
@@ -119,10 +133,10 @@ def test_extents_equal_the_geometry(aircraft):
 
 def test_wing_tips_rise_by_the_dihedral():
     """Six degrees more of dihedral lift the quarter chord of the tips by the half span times the tangents' gain."""
-    half_span_m = 0.5 * POWERED["span_m"]
+    half_span_m = 0.5 * STRAIGHT["span_m"]
     tips = []
     for dihedral_deg in (0.0, 6.0):
-        wing = aeroplane({**POWERED, "dihedral_deg": dihedral_deg})["wing"].mesh.vertices
+        wing = aeroplane({**STRAIGHT, "dihedral_deg": dihedral_deg})["wing"].mesh.vertices
         tips.append(wing[wing[:, 1] > half_span_m - 1e-9][:, 2])
     np.testing.assert_allclose(tips[0] - tips[1], half_span_m * np.tan(np.radians(6.0)), rtol=0, atol=ROUND_OFF_M)
 
@@ -142,7 +156,7 @@ def test_panels_rise_each_by_its_own_dihedral():
 
 def test_one_panel_is_the_straight_wing():
     """Both forms of the geometry make the same aeroplane, vertex by vertex."""
-    rest = {key: value for key, value in POWERED.items() if key not in STRAIGHT_WING + PANELS}
+    rest = {key: value for key, value in STRAIGHT.items() if key not in STRAIGHT_WING}
     straight = dict(zip(STRAIGHT_WING, (1.6, 0.26, 0.2, 5.0), strict=True))
     panel = dict(zip(PANELS, ([0.0, 0.8], [0.26, 0.2], [5.0]), strict=True))
     one, other = aeroplane({**rest, **straight}), aeroplane({**rest, **panel})
@@ -152,9 +166,9 @@ def test_one_panel_is_the_straight_wing():
 
 def test_each_aeroplane_has_the_controls_and_the_propeller_of_its_geometry():
     """No part of the chord, no surface; no diameter, no propeller."""
-    assert {p.hinge.control for p in MADE["endurance"].values() if p.hinge} == {"aileron", "elevator", "rudder"}
+    assert {p.hinge.control for p in MADE["straight"].values() if p.hinge} == {"aileron", "elevator", "rudder"}
     assert {p.hinge.control for p in MADE["polyhedral"].values() if p.hinge} == {"elevator", "rudder"}
-    assert "propeller" in MADE["endurance"]
+    assert "propeller" in MADE["straight"]
     assert not {"propeller", "spinner"} & set(MADE["polyhedral"])
     bare = aeroplane({**POLYHEDRAL, "elevator_part": 0.0, "rudder_part": 0.0})
     assert [name for name, part in bare.items() if part.hinge] == []
@@ -174,7 +188,7 @@ def test_surface_turns_about_its_hinge_line_by_its_throw(aircraft, name):
     arms = [p[edge] - part.hinge.point_m for p in (before, after)]
     one, other = (arm - part.hinge.axis * (arm @ part.hinge.axis) for arm in arms)
     angle_rad = np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)
-    np.testing.assert_allclose(angle_rad, 0.6 * np.radians(25.0), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(angle_rad, 0.6 * throw_rad(aircraft, part), rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("aircraft", "name"), HINGED)
@@ -186,7 +200,7 @@ def test_positive_control_moves_the_trailing_edge_so_that_the_rotation_follows(a
     arm_m = from_hinge_m(part, part.mesh.vertices)[edge]
     along = went @ np.array(TRAILING_EDGE_GOES[name])
     # Camber slopes an aileron's arm by 4 deg, which costs 1 - (sin 29 - sin 4) / sin 25 = 2 %; dihedral 1 - cos 5.
-    np.testing.assert_allclose(along, arm_m * np.sin(np.radians(25.0)), rtol=0.03, atol=0)
+    np.testing.assert_allclose(along, arm_m * np.sin(throw_rad(aircraft, part)), rtol=0.03, atol=0)
 
 
 @pytest.mark.parametrize(("aircraft", "name"), HINGED)
@@ -229,8 +243,7 @@ def test_section_thickness_is_that_of_the_naca_four_digits(thickness):
 
 @pytest.mark.parametrize("key", KEYS + STRAIGHT_WING)
 def test_geometry_without_a_key_is_refused_by_its_name(key):
-    base = POWERED if PANELS[0] not in POWERED else {**POWERED, **dict.fromkeys(STRAIGHT_WING, 1.0)}
-    lacking = {name: value for name, value in base.items() if name not in (key, *PANELS)}
+    lacking = {name: value for name, value in STRAIGHT.items() if name != key}
     with pytest.raises(ValueError, match=key):
         aeroplane(lacking)
 
@@ -238,7 +251,7 @@ def test_geometry_without_a_key_is_refused_by_its_name(key):
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
 def test_geometry_with_an_impossible_length_is_refused_with_its_value(value):
     with pytest.raises(ValueError, match=rf"tail_span_m = {value:g}"):
-        aeroplane({**POWERED, "tail_span_m": value})
+        aeroplane({**STRAIGHT, "tail_span_m": value})
 
 
 @pytest.mark.parametrize(
