@@ -332,8 +332,8 @@ def _problem(search: Search, t: Trim, left: Array, wanted: Array) -> str:
         )
     for name, target in zip(search.free, wanted, strict=True):
         low, high, _ = BOUNDS[name]
-        if name in ("elevator", "aileron", "rudder") and not low - 1e-9 <= target <= high + 1e-9:
-            return f"the {name} would have to go beyond {high if target > high else low:g}"
+        if name in ("throttle", "elevator", "aileron", "rudder") and not low - 1e-9 <= target <= high + 1e-9:
+            return f"the {name} has to go beyond {high if target > high else low:g}"
     return f"the search ended at {np.max(np.abs(left)):.2g} m/s2 or rad/s2, choose one between stall and top speed"
 
 
