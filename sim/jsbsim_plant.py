@@ -198,8 +198,8 @@ class Model:
 
     @property
     def powered(self) -> bool:
-        """Whether there is a motor."""
-        return self._properties.get_node("propulsion/engine/propeller-rpm") is not None
+        """Whether there is a propeller: only JSBSim's own gives its advance ratio."""
+        return self._properties.get_node("propulsion/engine/advance-ratio") is not None
 
     def thrust_n(self) -> float:
         """What the propeller pulled in the last step; 0 where there is none."""

@@ -173,5 +173,5 @@ def _asymmetric(values: Array, part: Array) -> tuple[Mode, ...]:
     # Four real roots: yaw and sideslip too are overdamped.
     rolls = int(np.argmax(part[ROLL_RATE]))
     spiral = int(order[-1])
-    dutch = [i for i in range(4) if i not in (rolls, spiral)]
-    return _mode("dutch_roll", values[dutch]), _mode("roll", values[[rolls]]), _mode("spiral", values[[spiral]])
+    others = [i for i in range(4) if i not in (rolls, spiral)]
+    return _mode("dutch_roll", values[others]), _mode("roll", values[[rolls]]), _mode("spiral", values[[spiral]])

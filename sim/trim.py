@@ -67,10 +67,9 @@ class Trim:
 
     @classmethod
     def of(cls, cruise: dict[str, Any]) -> "Trim":
-        """From the table `cruise` of an airframe.toml; one without a motor names the angle of its glide instead."""
-        alpha_rad, climb_rad = math.radians(cruise["alpha_deg"]), -math.radians(cruise.get("glide_deg", 0.0))
-        throttle = cruise.get("throttle", 0.0)
-        return cls(cruise["airspeed_m_s"], alpha_rad, cruise["elevator"], throttle, climb_rad=climb_rad)
+        """From the table `cruise` of an airframe.toml; without a motor it is a glide."""
+        alpha_rad, climb_rad = math.radians(cruise["alpha_deg"]), math.radians(cruise.get("flight_path_deg", 0.0))
+        return cls(cruise["airspeed_m_s"], alpha_rad, cruise["elevator"], cruise["throttle"], climb_rad=climb_rad)
 
     @property
     def command(self) -> ActuatorCommand:
@@ -111,7 +110,7 @@ class Trim:
         )
 
 
-def earth_to_body(vector_e: Sequence[float], euler_rad: tuple[float, float, float]) -> Array:
+def earth_to_body(vector_e: Sequence[float] | Array, euler_rad: tuple[float, float, float]) -> Array:
     """Body components of a vector given in earth axes, for roll, pitch and yaw (Stevens & Lewis, section 1.3)."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(euler_rad), np.cos(euler_rad)
     n, e, d = vector_e
@@ -209,9 +208,9 @@ class Search:
 def _newton(J: Array, f: Array) -> Array:
     """The step to where the linear model vanishes; the shortest that comes nearest where there is none."""
     try:
-        return np.linalg.solve(J, -f)
+        return np.asarray(np.linalg.solve(J, -f), np.float64)
     except np.linalg.LinAlgError:
-        return np.linalg.lstsq(J, -f, rcond=1e-12)[0]
+        return np.asarray(np.linalg.lstsq(J, -f, rcond=1e-12)[0], np.float64)
 
 
 def trim(
