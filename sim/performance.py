@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sim.jsbsim_plant import Model
 
 STEP_RAD = math.radians(0.25)
-FASTEST = 2.6  # times the stall speed: where the polar ends
+FASTEST = 3.0  # times the stall speed: where the polar ends
 BANKS_DEG = (15.0, 30.0, 45.0, 60.0)
 BANKED_ENOUGH_RAD, LONG_ENOUGH_S = math.radians(60.0), 3.0  # where the roll ends
 

@@ -276,10 +276,8 @@ def _power(search: Search, start: Trim) -> str:
     for throttle, sign, stop in ((1.0, 1.0, "full throttle"), (0.0, -1.0, "the motor off")):
         t, left, _ = along.run(replace(start, throttle=throttle))
         if np.max(np.abs(left)) < 1e-9 and sign * (start.climb_rad - t.climb_rad) > 0.0:
-            paths = f"the path is {math.degrees(t.climb_rad):.1f} deg with {stop}"
-            return (
-                f"the throttle would have to go beyond {throttle:g}: {paths}, not {math.degrees(start.climb_rad):.1f}"
-            )
+            asked, has = math.degrees(start.climb_rad), math.degrees(t.climb_rad)
+            return f"the throttle has to go beyond {throttle:g}: the path is {has:.1f} deg with {stop}, not {asked:.1f}"
     return ""
 
 

@@ -260,7 +260,7 @@ def mode_rows(book: Handbook) -> list[list[str]]:
     return rows
 
 
-MODE_HEADINGS = ("", "rad/s", "damping", "period s", "half s", "formula rad/s", "damping")
+MODE_HEADINGS = ("", "rad/s", "damping", "period s", "half s", "formula", "damping")
 
 
 def _number(value: float) -> str:
