@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from estimator.interface import Array
-from sim.linear import ASYMMETRIC, SYMMETRIC, LinearModel, Mode
+from sim.linear import ASYMMETRIC, SYMMETRIC, LinearModel, Mode, derivative
 
 if TYPE_CHECKING:
     from sim.jsbsim_plant import Model
@@ -30,7 +30,7 @@ U, V, W, P, Q, R, ROLL, PITCH = range(8)
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """What turns forces into coefficients, at one height and speed."""
+    """What turns forces into coefficients: the aeroplane, and its air, lift and drag at a trim."""
 
     mass_kg: float
     inertia_kg_m2: Array  # (3, 3), about the centre of gravity, body axes
@@ -39,13 +39,20 @@ class Airframe:
     chord_m: float
     density_kg_m3: float
     airspeed_m_s: float
+    lift_n: float  # with the thrust's part across the path
+    drag_n: float
 
     @classmethod
     def of(cls, model: "Model", linear: LinearModel) -> "Airframe":
-        """Of `model`, in the air where it was last."""
-        area, span, chord = model.wing()
-        inertia, density = model.inertia_tensor_kg_m2(), model.density_kg_m3()
-        return cls(model.mass_kg(), inertia, area, span, chord, density, linear.trim.airspeed_m_s)
+        """Of `model`, put into the trim of `linear`; the thrust acts along the body's x axis."""
+        t, x = linear.trim, linear.x
+        derivative(model, x, linear.u)
+        weight_n = model.mass_kg() * G_M_S2
+        return cls(
+            model.mass_kg(), model.inertia_tensor_kg_m2(), *model.wing(), model.density_kg_m3(), t.airspeed_m_s,
+            weight_n * math.cos(t.climb_rad),
+            model.thrust_n() * math.cos(t.alpha_rad) - weight_n * math.sin(t.climb_rad),
+        )  # fmt: skip
 
     @property
     def pressure_force_n(self) -> float:
@@ -65,11 +72,11 @@ def stability_axes(linear: LinearModel) -> Array:
     return T @ linear.A[:8, :8] @ T.T
 
 
-def coefficients(linear: LinearModel, frame: Airframe, drag_coefficient: float) -> dict[str, float]:
+def coefficients(linear: LinearModel, frame: Airframe) -> dict[str, float]:
     """Dimensionless derivatives per radian, rates as p b / 2V and q c / 2V, controls per full deflection.
 
-    Lift and moments in stability axes, with the thrust as it goes with the state.  `drag_coefficient` is the
-    trimmed one: lift turns with the wind, the forces of the linear model do not (Nelson, chapter 3).
+    Lift and moments in stability axes, with the thrust as it goes with the state.  Lift turns with the wind, the
+    forces of the linear model do not: the drag makes up for that (Nelson, chapter 3).
     """
     c, s = math.cos(linear.trim.alpha_rad), math.sin(linear.trim.alpha_rad)
     R_sb = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
@@ -81,7 +88,7 @@ def coefficients(linear: LinearModel, frame: Airframe, drag_coefficient: float) 
     p_hat, q_hat = 2.0 * speed / span, 2.0 * speed / chord
     roll, pitch, yaw = moments[0] / per_span, moments[1] / per_chord, moments[2] / per_span
     values = {
-        "CL_alpha": -force * A[W, W] * speed - drag_coefficient,
+        "CL_alpha": -force * A[W, W] * speed - frame.drag_n / qs,
         "CL_q": -force * (A[W, Q] - speed) * q_hat,
         "Cm_alpha": pitch[W] * speed,
         "Cm_q": pitch[Q] * q_hat,

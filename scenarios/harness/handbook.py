@@ -13,9 +13,9 @@ from scenarios.harness import console
 from sim import performance
 from sim.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.jsbsim_plant import Model
-from sim.linear import LinearModel, Mode, linearise, modes, state_of
+from sim.linear import LinearModel, Mode, linearise, modes
 from sim.performance import Performance, radius_m
-from sim.trim import Trim, settled
+from sim.trim import Trim
 
 PHYSICS_HZ = 200
 HEIGHT_M = 60.0
@@ -100,16 +100,10 @@ def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
     model = Model(name, PHYSICS_HZ)
     p = performance.measure(model, height_m)
     linear = linearise(model, p.cruise, height_m)
-    t = p.cruise
-    settled(model, height_m, t.euler_rad(), state_of(t, height_m)[:3], t.omega_b_rad_s, t.command)
     frame = Airframe.of(model, linear)
-    # Along the path thrust, drag and weight balance.
-    drag_n = model.thrust_n() * math.cos(t.alpha_rad) - frame.mass_kg * 9.80665 * math.sin(t.climb_rad)
-    lift_n = frame.mass_kg * 9.80665 * math.cos(t.climb_rad)
-    return Handbook(
-        name, model, frame, p, linear, modes(linear), textbook(linear), lanchester(t.airspeed_m_s, lift_n / drag_n),
-        coefficients(linear, frame, drag_n / frame.pressure_force_n),
-    )  # fmt: skip
+    simple = lanchester(p.cruise.airspeed_m_s, frame.lift_n / frame.drag_n)
+    derivatives = coefficients(linear, frame)
+    return Handbook(name, model, frame, p, linear, modes(linear), textbook(linear), simple, derivatives)
 
 
 def check_picture(path: Path | None) -> None:

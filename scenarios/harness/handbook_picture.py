@@ -28,7 +28,7 @@ COLOURS = {
     "spiral": VIOLET,
     "roll_spiral": VIOLET,
 }
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 9.0,
     "text.color": INK,
@@ -283,9 +283,8 @@ def _turns(ax: Any, book: Handbook) -> None:
     at = float(np.interp(0.72 * top, limit, speeds))
     ax.text(at - 0.02 * fast, 0.74 * top, "stalled", fontsize=8.3, color=RED, ha="right")
     for t in p.turns:
-        rate = math.degrees(t.turn_rate_rad_s)
         use = f"throttle {t.throttle:.2f}" if p.top_speed else f"sink {-t.climb_m_s:.2f} m/s"
-        _mark(ax, t.airspeed_m_s, rate, f"r = {radius_m(t):.1f} m, {use}", BLUE, (8, 5))
+        _mark(ax, t.airspeed_m_s, math.degrees(t.turn_rate_rad_s), f"r = {radius_m(t):.1f} m, {use}", BLUE, (8, 5))
     ax.set(xlim=(0.94 * stall, 1.02 * fast), ylim=(0.0, top))
     ax.set(xlabel="airspeed, m/s", ylabel="rate of turn, deg/s", title="Steady turns, by bank angle")
 
