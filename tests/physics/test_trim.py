@@ -128,7 +128,10 @@ def test_level_flight_in_wind_is_that_in_still_air(model):
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0, 0.0), (-4.0, 3.0, 0.0)])
 def test_trimmed_flight_stays_trimmed_for_half_a_minute(wind):
-    """Hands off for 30 s: what the trim leaves and the integrator adds moves speed, height and bank by no more."""
+    """Hands off for 30 s: the change of Coriolis and the integrator move speed, height and bank by no more than this.
+
+    Measured: 0.0007 m/s, 8 mm, 0.010 deg, the most of it in the wind, for which the start does not trim.
+    """
     plant = JsbsimPlant(start=InFlight(heading_rad=0.7, height_m=HEIGHT_M), air=Air(wind_e_m_s=wind))
     log = Log.empty(1500)
     plant.reset(log)
@@ -136,9 +139,9 @@ def test_trimmed_flight_stays_trimmed_for_half_a_minute(wind):
         assert plant.advance(k, plant.trimmed.command) is None
     rows = log.truth
     bank = np.arctan2(rows["R_eb"][:, 2, 1], rows["R_eb"][:, 2, 2])
-    assert np.abs(rows["airspeed_m_s"] - 12.6).max() < 0.02
-    assert np.abs(-rows["p_e_m"][:, 2] - HEIGHT_M).max() < 0.2
-    assert np.degrees(np.abs(bank)).max() < 0.2
+    assert np.abs(rows["airspeed_m_s"] - 12.6).max() < 0.003
+    assert np.abs(-rows["p_e_m"][:, 2] - HEIGHT_M).max() < 0.03
+    assert np.degrees(np.abs(bank)).max() < 0.03
 
 
 REFUSED = {
