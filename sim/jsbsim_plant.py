@@ -196,6 +196,30 @@ class Model:
         """Principal moments of inertia, shape (3,)."""
         return SLUGFT2_TO_KGM2 * self.get(*(f"inertia/i{a}{a}-slugs_ft2" for a in "xyz"))
 
+    @property
+    def powered(self) -> bool:
+        """Whether there is a propeller: only JSBSim's own gives its advance ratio."""
+        return self._properties.get_node("propulsion/engine/advance-ratio") is not None
+
+    def thrust_n(self) -> float:
+        """What the propeller pulled in the last step; 0 where there is none."""
+        return LB_TO_N * float(self.get("propulsion/engine/thrust-lbs")[0]) if self.powered else 0.0
+
+    def inertia_tensor_kg_m2(self) -> Array:
+        """Inertia about the centre of gravity, body axes, shape (3, 3): products of inertia with their minus signs."""
+        names = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
+        xx, yy, zz, xy, yz, xz = SLUGFT2_TO_KGM2 * self.get(*(f"inertia/{name}-slugs_ft2" for name in names))
+        return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
+
+    def wing(self) -> tuple[float, float, float]:
+        """What the coefficients refer to: area [m2], span and mean chord [m]."""
+        area, span, chord = self.get("metrics/Sw-sqft", "metrics/bw-ft", "metrics/cbarw-ft")
+        return area * FT_TO_M**2, span * FT_TO_M, chord * FT_TO_M
+
+    def density_kg_m3(self) -> float:
+        """Of the air where the aeroplane is."""
+        return float(self.get("atmosphere/rho-slugs_ft3")[0]) * SLUG_TO_KG / FT_TO_M**3
+
     def force_and_moment(self) -> tuple[Array, Array]:
         """All forces but gravity [N] and all moments [N m] on the body in the last step, body axes."""
         force = LB_TO_N * self.get(*(f"forces/fb{a}-total-lbs" for a in "xyz"))
@@ -246,6 +270,27 @@ class Model:
             self.run()
         for write, scheme in self._integrators:
             write(scheme)
+
+    def settle(self) -> None:
+        """Hold the motion until the propeller turns steadily under the command and in the air of now.
+
+        A step of any length dt takes its speed from n to n + dt f(n).  With dt = -1 / f'(n), the slope from the two
+        steps before, that is Newton's step to f = 0: ten of them do what takes seconds of simulated time.
+        """
+        if self.powered:
+            rpm = self.getter("propulsion/engine/propeller-rpm")
+            now, before, slowing, dt_s = rpm(), math.nan, math.nan, 0.03
+            for _ in range(60):
+                self.fdm.set_dt(dt_s)
+                self.frozen(1)
+                change = rpm() - now
+                if abs(change) < 1e-12 * abs(now) or rpm() < 1e-3:
+                    break
+                slope = (change / dt_s - slowing) / (now - before) if now != before else math.nan
+                slowing, before, now = change / dt_s, now, rpm()
+                dt_s = min(0.2, max(0.005, -1.0 / slope)) if slope < 0.0 else 0.03
+            self.fdm.set_dt(self.dt_s)
+        self.frozen(2)  # what the model reads of the step before is now that of a steady propeller
 
     def remember(self, on: bool) -> None:
         """Off: integrate the velocity without a memory of past accelerations, which would smear a force that jumps."""
@@ -315,7 +360,7 @@ class JsbsimPlant:
                     f"height_m {start.height_m} m: must be above 0 and below 10000 m, with a finite heading"
                 )
             airspeed_m_s = self.trimmed.airspeed_m_s if start.airspeed_m_s is None else start.airspeed_m_s
-            self.trimmed = trim(self.model, airspeed_m_s, start.height_m)
+            self.trimmed = trim(self.model, airspeed_m_s, start.height_m, heading_rad=start.heading_rad)
         self._state = np.zeros(1, STATE_DTYPE)
         self._buffer = self._state.data
         latitude_rad = math.radians(LATITUDE_DEG)
@@ -342,13 +387,12 @@ class JsbsimPlant:
             self._start_in_flight(self.start)
 
     def _start_in_flight(self, start: InFlight) -> None:
-        """Trimmed, level relative to the moving air, heading as asked; servos and propeller as in the trim."""
+        """Trimmed relative to the moving air, heading as asked; servos and propeller as in the trim."""
         t = self.trimmed
-        euler_rad = (0.0, t.alpha_rad, start.heading_rad)
+        euler_rad = t.euler_rad(start.heading_rad)
         R_eb = np.empty((3, 3))
         rotation_of(*euler_rad, R_eb)
-        through_air_b = t.airspeed_m_s * np.array([math.cos(t.alpha_rad), 0.0, math.sin(t.alpha_rad)])
-        v_b = through_air_b + R_eb.T @ np.array(self.air.wind_e_m_s)
+        v_b = t.air_velocity_b_m_s + R_eb.T @ np.array(self.air.wind_e_m_s)
         self.begin((start.north_m, start.east_m, -start.height_m), euler_rad, v_b, command=t.command)
 
     def begin(

@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | bench | view``.
+"""The command line: ``wingslevel list | fly | check | bench | aircraft | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -198,6 +198,29 @@ def bench(
         benchmark.tell(speed)
         report(speed.to_json())
     return 0 if speed.passed else 1
+
+
+@app.command()
+def aircraft(
+    name: Annotated[str, typer.Argument(help="Name of an aircraft.")],
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
+    json_: JsonOption = None,
+) -> None:
+    """The handbook page of an aeroplane: speeds, glide, climb, turns, stability and natural modes."""
+    from scenarios.harness import handbook
+
+    with _reporting(json_) as report:
+        with usage():
+            _check_file(picture)
+            handbook.check_picture(picture)
+            book = handbook.make(name)
+        handbook.tell(book)
+        if picture is not None:
+            from scenarios.harness import handbook_picture
+
+            with usage():
+                handbook_picture.draw(book, picture)
+        report(book.to_json())
 
 
 @app.command()

@@ -95,6 +95,17 @@ def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Table"
     return grid
 
 
+def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = (0,)) -> "Table":
+    """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty."""
+    grid = _table(title)
+    grid.show_header = any(headings)
+    for i, heading in enumerate(headings):
+        grid.add_column(heading, justify="left" if i in text else "right", no_wrap=True)
+    for row in rows:
+        grid.add_row(*row)
+    return grid
+
+
 def _table(title: str, *wrapping: str) -> "Table":
     """A plain table; of its columns only the `wrapping` ones give way where it is narrow, never a number."""
     from rich import box
