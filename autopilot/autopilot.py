@@ -163,9 +163,7 @@ class DcmAutopilot:
                         and holds from the next `reset` on
     """
 
-    def __init__(
-        self, params: AutopilotParams | None = None, heading_reference: HeadingReference = "course"
-    ) -> None:
+    def __init__(self, params: AutopilotParams | None = None, heading_reference: HeadingReference = "course") -> None:
         self.params = params or AutopilotParams()
         self.heading_reference = heading_reference
         self.reset()

@@ -118,9 +118,7 @@ def _failure(outcome: Outcome, who: object, t_s: float, error: Exception) -> Fli
     return FlightCodeFailed(outcome, who, t_s, fault)
 
 
-def estimate_of(
-    estimator: AttitudeEstimator, measured: Measurements, flown: NDArray[Any], k: int
-) -> AttitudeEstimate:
+def estimate_of(estimator: AttitudeEstimator, measured: Measurements, flown: NDArray[Any], k: int) -> AttitudeEstimate:
     """Ask the estimator for tick `k` and record what it says; FlightCodeFailed where that is unusable."""
     try:
         estimate = estimator.update(measured)

@@ -101,6 +101,11 @@ class MovingAir:
         self._noise = np.zeros((1, 8))
 
     @property
+    def now(self) -> list[float]:
+        """What blows at the aeroplane: wind north, east, down [m/s], rates p, q, r [rad/s]."""
+        return self._now.tolist()
+
+    @property
     def wind_e_m_s(self) -> Array:
         """The wind at the aeroplane, shape (3,)."""
         return self._now[:3].copy()
@@ -122,12 +127,12 @@ class MovingAir:
         begin(self.state, self._noise, self._gusts, self._places)
 
     def blow(self, truth: Array, k: int) -> list[float]:
-        """The air of tick `k` at the place of truth row k - 1: wind north, east, down [m/s], rates p, q, r [rad/s].
+        """The air of tick `k` at the place of truth row k - 1, as `now`.
 
         Called once for each tick, in order.
         """
         blow(truth, k, self.state, self._noise, self._gusts, self._places)
-        return self._now.tolist()  # type: ignore[no-any-return]
+        return self._now.tolist()
 
 
 @kernel
@@ -139,9 +144,7 @@ def _gather(t_s, distance_m, z, s, gusts, places):  # type: ignore[no-untyped-de
     for i in range(3):
         wind_e[i] = share * s.wind_e_m_s[i]
         rate_b[i] = 0.0
-    wind_e[2] -= updraft_m_s(
-        s.p_e_m[0], s.p_e_m[1], height_m, places, s.thermal_m_s, s.inversion_m, s.thermal_area_m2
-    )
+    wind_e[2] -= updraft_m_s(s.p_e_m[0], s.p_e_m[1], height_m, places, s.thermal_m_s, s.inversion_m, s.thermal_area_m2)
     add_gusts(t_s - s.release_s, gusts, wind_e)
     if s.w20_m_s > 0.0:
         dryden.add_turbulence(distance_m, height_m, z, s, wind_e, rate_b)

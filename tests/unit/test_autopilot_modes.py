@@ -73,9 +73,7 @@ def test_course_nose_estimator_crabs_into_the_wind():
     north = Setpoint(Mode.COURSE, course_rad=0.0)
     windy = estimate(wind=np.array([0.0, 5.0, 0.0]))
     assert DcmAutopilot(heading_reference="nose").update(windy, measurements(), north).bank_demand_rad < -0.1
-    assert (
-        DcmAutopilot(heading_reference="course").update(windy, measurements(), north).bank_demand_rad == 0.0
-    )
+    assert DcmAutopilot(heading_reference="course").update(windy, measurements(), north).bank_demand_rad == 0.0
 
 
 def test_return_heading_away_turns_back_at_the_limit_and_heading_home_flies_straight():
@@ -114,9 +112,7 @@ def test_mode_change_out_of_rate_forgets_the_integral_of_the_manoeuvre():
     pull = Setpoint(Mode.RATE, rate_b_rad_s=(0.0, 0.3, 0.0))
     for _ in range(100):
         autopilot.update(LEVEL, measurements(), pull)
-    assert autopilot.update(LEVEL, measurements(), level) == DcmAutopilot().update(
-        LEVEL, measurements(), level
-    )
+    assert autopilot.update(LEVEL, measurements(), level) == DcmAutopilot().update(LEVEL, measurements(), level)
 
 
 def test_setpoint_throttle_overrides_the_autopilot_where_given():

@@ -135,9 +135,7 @@ def test_rate_control_coordinated_turn_does_not_leak_into_the_pitch_damping(bank
     """The mixing problem: in a true turn the elevator is the one of the load alone, none of it damps the turn."""
     R = attitude(bank, 0.0)
     omega = R.T @ [0.0, 0.0, G_M_S2 * math.tan(bank) / PARAMS.airspeed_m_s]
-    undamped = StabiliseParams(
-        elevator_per_rate_error_s=0.0, aileron_per_rate_error_s=0.0, rudder_per_rate_error_s=0.0
-    )
+    undamped = StabiliseParams(elevator_per_rate_error_s=0.0, aileron_per_rate_error_s=0.0, rudder_per_rate_error_s=0.0)
     demand = rate_demand(R, omega, bank, 0.0, record())
     damped = rate_control(demand, R, omega, state(), record(), 0.02)
     without = rate_control(demand, R, omega, state(), record(undamped), 0.02)
