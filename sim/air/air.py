@@ -113,7 +113,7 @@ class MovingAir:
     def start(self, n_ticks: int, p_e_m: tuple[float, float, float]) -> None:
         """Begin a flight of at most `n_ticks` at `p_e_m`, at power-up; the turbulence is stationary at once."""
         s = self.state[0]
-        s["p_e_m"] = p_e_m
+        s["p_e_m"], s["airspeed_m_s"] = p_e_m, 0.0
         if self.air.is_steady:
             self._now[:3] = self.air.wind_e_m_s
             return
