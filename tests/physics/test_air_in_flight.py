@@ -36,7 +36,7 @@ def test_jsbsim_flies_in_the_wind_of_the_truth():
 
 
 def test_wind_in_the_hand_is_that_at_the_height_of_the_hand():
-    """5 m/s at 10 m with an exponent of 0.14 is 5 (1.7 / 10)^0.14 = 3.90 m/s in the hand, and grows in the climb."""
+    """5 m/s at 10 m with an exponent of 0.14 is 5 (1.7 / 10)^0.14 = 3.90 m/s in the hand."""
     plant = JsbsimPlant(start=THROW, air=Air((0.0, 5.0, 0.0), shear=0.14))
     rows = flown(plant, 4.0, ActuatorCommand(0.0, 0.1, 0.0, 1.0))
     held = rows[rows["phase"] == Phase.HELD]
@@ -46,7 +46,7 @@ def test_wind_in_the_hand_is_that_at_the_height_of_the_hand():
     # The wind of a tick is that where the aeroplane was at its beginning.
     height_m = -rows["p_e_m"][:-1, 2]
     np.testing.assert_allclose(rows["wind_e_m_s"][1:, 1], 5.0 * (height_m / 10.0) ** 0.14, rtol=0, atol=1e-9)
-    assert rows["wind_e_m_s"][-1, 1] > held["wind_e_m_s"][0, 1]
+    assert np.ptp(height_m) > 1.0
 
 
 def test_turbulence_in_the_hand_blows_past_with_the_mean_wind():
@@ -71,7 +71,7 @@ def test_gust_in_flight_is_exact_and_counts_from_the_release():
 
 
 def test_flight_starts_trimmed_in_whatever_blows_there():
-    """Neither turbulence, nor shear, nor a thermal jolts the first tick: airspeed and angle of attack are the trim's."""
+    """No jolt in the first tick by turbulence, shear or a thermal: airspeed and angle of attack are the trim's."""
     air = Air((-4.0, 3.0, 0.0), 8.0, 0.2, thermals=Thermals(((0.0, 0.0),)))
     plant = JsbsimPlant(start=LEVEL, air=air, seed=11)
     first = flown(plant, 0.1)[0]

@@ -63,9 +63,10 @@ def test_parse_gust_of_nonsense_is_refused_in_one_line(text, words):
 def test_parse_gust_of_any_text_is_a_gust_or_a_value_error(text):
     """Nothing that is typed crashes it."""
     try:
-        assert isinstance(parse_gust(text), GustConfig)
-    except ValueError as refused:
-        assert "\n" not in str(refused) or "\n" in text
+        gust = parse_gust(text)
+    except ValueError:
+        return
+    assert isinstance(gust, GustConfig)
 
 
 @pytest.mark.parametrize(
@@ -154,8 +155,10 @@ def test_command_line_of_all_air_reaches_the_manifest_in_plain_numbers(tmp_path,
     """Several gusts, a word for turbulence, a number of thermals; several of them in one go."""
     monkeypatch.chdir(tmp_path)
     run(
-        "fly hand_launch --no-rerun --duration 1 --wind 5@270 --shear 0.14 --gust 4@12s --gust 2@1s:up "
-        "--turbulence moderate --thermals 3".split()
+        [
+            *("fly", "hand_launch", "--no-rerun", "--duration", "1", "--wind", "5@270", "--shear", "0.14"),
+            *("--gust", "4@12s", "--gust", "2@1s:up", "--turbulence", "moderate", "--thermals", "3"),
+        ]
     )
     (folder,) = (tmp_path / "flights").iterdir()
     air = load(folder).manifest["config"]["air"]
