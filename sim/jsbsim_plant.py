@@ -20,11 +20,10 @@ from autopilot.interface import NEUTRAL, ActuatorCommand
 from estimator.interface import Array
 from estimator.jit import kernel
 from sim import hand
-from sim.air import STILL, Air
+from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
 from sim.log import Log, Outcome, Phase
 from sim.plant import HandThrow, InFlight, Start
-from sim.rng import stream
 from sim.trim import Trim, trim
 from sim.truth import EARTH_RATE_RAD_S, earth_rate_e_rad_s, gravity_m_s2, integrate_imu
 
@@ -49,6 +48,9 @@ READ: dict[str, tuple[str, ...]] = {
     "contact": ("forces/fbz-gear-lbs",),
 }
 WRITE = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
+WIND = tuple(f"atmosphere/wind-{d}-fps" for d in ("north", "east", "down"))
+# Rates of the air, which an aeroplane's damping terms take off its own (JSBSim's own turbulence rates cannot be set).
+AIR_RATES = tuple(f"gust/{a}-rad_sec" for a in "pqr")
 INTEGRATORS = tuple(f"simulation/integrator/{a}" for a in (
     "rate/rotational", "rate/translational", "position/rotational", "position/translational",
 ))  # fmt: skip
@@ -181,6 +183,9 @@ class Model:
         """Bound method that writes the property `name`, in JSBSim's unit."""
         return self._node(name).set_double_value  # type: ignore[no-any-return]
 
+    def has(self, name: str) -> bool:
+        return self._properties.get_node(name) is not None
+
     def get(self, *names: str) -> Array:
         return np.array([self.getter(name)() for name in names])
 
@@ -239,7 +244,7 @@ class Model:
         self, height_m: float, euler_rad: tuple[float, float, float], v_b_m_s: Array,
         omega_b_rad_s: tuple[float, float, float], command: ActuatorCommand, air: Air, settle: int,
     ) -> None:  # fmt: skip
-        """Start anew above the launch point: velocity over the ground in body axes, servos at `command`, steady wind.
+        """Start anew above the launch point: velocity over the ground in body axes, servos at `command`, mean wind.
 
         Then the motion is frozen for `settle` steps (at least 1), in which the propeller finds its speed.
         """
@@ -251,12 +256,12 @@ class Model:
         self.put(dict(zip(("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"), euler_rad, strict=True)))
         self.put({f"ic/{a}-fps": float(v) / FT_TO_M for a, v in zip("uvw", v_b_m_s, strict=True)})
         self.put({f"ic/{a}-rad_sec": w for a, w in zip("pqr", omega_b_rad_s, strict=True)})
-        self.put({"atmosphere/turb-type": 0.0})
+        self.put({"atmosphere/turb-type": 0.0})  # JSBSim's own: above sea level, and astray in oblique winds
         self.push(np.zeros(3), np.zeros(3))
         self.fdm.run_ic()  # forgets commands and wind
         self.put(dict(zip(WRITE, command[:4], strict=True)))
-        names = (f"atmosphere/wind-{d}-fps" for d in ("north", "east", "down"))
-        self.put({name: w / FT_TO_M for name, w in zip(names, air.wind_e_m_s, strict=True)})
+        wind_e = air.mean_wind_e_m_s(height_m)
+        self.put({name: float(w) / FT_TO_M for name, w in zip(WIND, wind_e, strict=True)})
         self.fdm.set_trim_status(True)  # servos jump to their commands
         self.frozen(1)
         self.fdm.set_trim_status(False)
@@ -297,17 +302,6 @@ class Model:
         write, scheme = self._integrators[1]
         write(scheme if on else 1.0)
 
-    def stir(self, air: Air, seed: int) -> None:
-        """Start the turbulence of `air`: JSBSim's MIL-F-8785C, its own generator, started from `seed`.
-
-        JSBSim 1.3 turns the long-wave axis of winds between the cardinal directions to the wrong side; the
-        strength is right, and along the four directions all is.
-        """
-        if air.turbulence_w20_m_s > 0.0:
-            w20 = "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps"
-            self.put({"atmosphere/turb-type": 3.0, w20: air.turbulence_w20_m_s / FT_TO_M})
-            self.put({"atmosphere/turbulence/milspec/severity": 3.0, "atmosphere/randomseed": float(seed)})
-
     def push(self, force_b_n: Array, moment_b_nm: Array) -> None:
         """Set the force and the moment of the hand, body axes; they stay until set again."""
         hand_force, moment = "external_reactions/hand", "external_reactions/hand_moment"
@@ -323,9 +317,9 @@ class JsbsimPlant:
     ----------
     aircraft : name of a folder of `sim/aircraft`
     start : in the air or thrown by hand
-    air : wind and turbulence
+    air : wind, gusts, turbulence, thermals
     rates : physics and inertial rates
-    seed, flight : which random streams (the turbulence is the only one here)
+    seed, flight : which random streams (the turbulence alone draws any here)
     box : where the flight may be
 
     Raises ValueError for an unknown aircraft or a start that cannot be.
@@ -342,8 +336,6 @@ class JsbsimPlant:
         self.start, self.air = start, air
         self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
         self._physics_hz, self._aircraft = rates.physics_hz, aircraft
-        # JSBSim keeps the seed in a 32-bit signed integer.
-        self._turbulence_seed = int(stream(seed, flight, "turbulence").integers(1, 2**31 - 1))
         self._hold_ticks = self._release_tick = self._hand_ticks = 0
         if isinstance(start, HandThrow):
             hand.check(start)
@@ -352,6 +344,9 @@ class JsbsimPlant:
             self._hand_ticks = self._release_tick + 1  # the first tick of the flight puts its integrator away
         self.release_s = self._release_tick * self.dt_s
         self._load()
+        span_m = FT_TO_M * float(self.model.get("metrics/bw-ft")[0])
+        self._moving_air = MovingAir(air, span_m, self.dt_s, self.release_s, seed, flight)
+        self._air_moves = not air.is_steady
         self.airframe = self.model.airframe
         self.trimmed = Trim.of(self.airframe["cruise"])
         if isinstance(start, InFlight):
@@ -369,10 +364,12 @@ class JsbsimPlant:
         s["dt_s"], s["box_radius_m"], s["box_height_m"] = self.dt_s, box.radius_m, box.height_m
 
     def _load(self) -> None:
-        """A JSBSim of its own for each flight: its turbulence filters and blown-up states outlive any reset."""
+        """A JSBSim of its own for each flight: blown-up states outlive any reset."""
         self.model = Model(self._aircraft, self._physics_hz)
         self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
         self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._wind = tuple(self.model.setter(p) for p in WIND)
+        self._air_rates = tuple(self.model.setter(p) for p in AIR_RATES if self.model.has(p))
         self._pack = Struct(f"{len(self._getters)}d").pack_into
 
     def reset(self, log: Log) -> None:
@@ -380,11 +377,14 @@ class JsbsimPlant:
         self._load()
         self._truth = log.truth
         s = self._state[0]
-        if isinstance(self.start, HandThrow):
-            rotation_of(*hand.sway(self.start, 0.0)[0], s["R_eb"])
+        start = self.start
+        if isinstance(start, HandThrow):
+            self._moving_air.start(len(log), (0.0, 0.0, -start.height_m))
+            rotation_of(*hand.sway(start, 0.0)[0], s["R_eb"])
             s["v_e_m_s"] = 0.0
         else:
-            self._start_in_flight(self.start)
+            self._moving_air.start(len(log), (start.north_m, start.east_m, -start.height_m))
+            self._start_in_flight(start)
 
     def _start_in_flight(self, start: InFlight) -> None:
         """Trimmed relative to the moving air, heading as asked; servos and propeller as in the trim."""
@@ -392,7 +392,7 @@ class JsbsimPlant:
         euler_rad = t.euler_rad(start.heading_rad)
         R_eb = np.empty((3, 3))
         rotation_of(*euler_rad, R_eb)
-        v_b = t.air_velocity_b_m_s + R_eb.T @ np.array(self.air.wind_e_m_s)
+        v_b = t.air_velocity_b_m_s + R_eb.T @ self._moving_air.wind_e_m_s
         self.begin((start.north_m, start.east_m, -start.height_m), euler_rad, v_b, command=t.command)
 
     def begin(
@@ -412,7 +412,8 @@ class JsbsimPlant:
         settle = max(1, round(settle_s / self.model.dt_s))
         self.model.place(-p_e_m[2], euler_rad, v_b_m_s, omega_b_rad_s, command, self.air, settle)
         self._anchor(p_e_m)
-        self.model.stir(self.air, self._turbulence_seed)
+        if self._air_moves:
+            self._blow(*self._moving_air.now)
 
     def _anchor(self, p_e_m: tuple[float, float, float]) -> None:
         """Let the place where JSBSim now is be `p_e_m`."""
@@ -421,6 +422,8 @@ class JsbsimPlant:
 
     def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
         """Fly tick `k` under `command` and fill truth row k; an Outcome where the flight ended in it."""
+        if self._air_moves:
+            self._blow(*self._moving_air.blow(self._truth, k))
         if k < self._hand_ticks:
             return self._in_hand(k, command)
         self._command(command)
@@ -428,6 +431,13 @@ class JsbsimPlant:
         for _ in range(self.steps):
             run()
         return self._observe(k)
+
+    def _blow(self, *air: float) -> None:
+        """Set the wind (3) and the rates of the air (3), which hold over the tick."""
+        for write, speed_m_s in zip(self._wind, air[:3], strict=True):
+            write(speed_m_s / FT_TO_M)
+        for write, rate_rad_s in zip(self._air_rates, air[3:], strict=False):  # none where the aeroplane has none
+            write(rate_rad_s)
 
     def _command(self, command: ActuatorCommand) -> None:
         self._aileron(command[0])
@@ -482,7 +492,7 @@ class JsbsimPlant:
         row["omega_b_rad_s"] = np.array(rates) + row["R_eb"].T @ self._state[0]["earth_rate_e"]
         row["p_e_m"] = (0.0, 0.0, -start.height_m)
         row["v_e_m_s"] = 0.0
-        row["wind_e_m_s"] = self.air.wind_e_m_s
+        row["wind_e_m_s"] = self._moving_air.wind_e_m_s
         row["phase"] = Phase.HELD
         complete(self._truth, k, self._state)
 

@@ -37,6 +37,27 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
 ]
+WindOption = Annotated[
+    str | None,
+    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm."),
+]
+ShearOption = Annotated[
+    str | None,
+    typer.Option("--shear", metavar="EXP", help="Growth of the wind with height: 0 none, 0.14 open country."),
+]
+GustOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; repeat it."
+    ),
+]
+TurbulenceOption = Annotated[
+    str | None,
+    typer.Option("--turbulence", metavar="W20", help="calm, light, moderate, severe, or the wind at 20 ft, m/s."),
+]
+ThermalsOption = Annotated[
+    str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
+]
 JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
@@ -105,10 +126,11 @@ def fly(
     estimator: EstimatorOption = None,
     aircraft: Annotated[str | None, typer.Option(help="Name of an aircraft.")] = None,
     autopilot: Annotated[str | None, typer.Option(help="Registered name, module:Class or file.py:Class.")] = None,
-    wind: Annotated[
-        str | None, typer.Option(metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm.")
-    ] = None,
-    turbulence: Annotated[float | None, typer.Option(metavar="W20", help="Wind at 20 ft that scales it, m/s.")] = None,
+    wind: WindOption = None,
+    shear: ShearOption = None,
+    gust: GustOption = None,
+    turbulence: TurbulenceOption = None,
+    thermals: ThermalsOption = None,
     gps_rate: Annotated[float | None, typer.Option(metavar="HZ", help="Reports of the GPS.")] = None,
     imu_rate: Annotated[int | None, typer.Option(metavar="HZ", help="Gyro, accelerometer and the loop.")] = None,
     sensors: Annotated[str | None, typer.Option(help="Name of a sensor suite.")] = None,
@@ -128,8 +150,6 @@ def fly(
         "estimator": estimator,
         "aircraft": aircraft,
         "autopilot": autopilot,
-        "wind": wind,
-        "air.turbulence_w20_m_s": turbulence,
         "rates.gps_hz": gps_rate,
         "rates.imu_hz": imu_rate,
         "suite": sensors,
@@ -138,7 +158,7 @@ def fly(
     }
     with _reporting(json_) as report:
         with usage():
-            changes = _changes(set_) | {name: value for name, value in named.items() if value is not None}
+            changes = _changes(set_) | _given(named) | _air(wind, shear, gust, turbulence, thermals)
             flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web)
         single.tell(flown)
         report(flown.to_json())
@@ -152,6 +172,11 @@ def check(
     names: Annotated[list[str] | None, typer.Argument(help="Scenarios; all of them where none is named.")] = None,
     seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")] = "0-9",
     estimator: EstimatorOption = None,
+    wind: WindOption = None,
+    shear: ShearOption = None,
+    gust: GustOption = None,
+    turbulence: TurbulenceOption = None,
+    thermals: ThermalsOption = None,
     set_: SetOption = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
@@ -165,7 +190,8 @@ def check(
         with usage():
             for path in (junit, markdown):
                 _check_file(path)
-            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, _changes(set_))
+            changes = _changes(set_) | _air(wind, shear, gust, turbulence, thermals)
+            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
                 verdict, whole = gate.fly_all(tasks, workers or _processors(), advance)
@@ -247,6 +273,18 @@ def _changes(assignments: list[str] | None) -> dict[str, Any]:
             raise _refusal(f"--set {text!r}: write name=value, for instance gps.latency_s=0.5")
         changes[name.strip()] = value.strip()
     return changes
+
+
+def _given(named: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in named.items() if value is not None}
+
+
+def _air(
+    wind: str | None, shear: str | None, gust: list[str] | None, turbulence: str | None, thermals: str | None
+) -> dict[str, Any]:
+    """Overrides of the options about the air."""
+    named = {"wind": wind, "air.shear": shear, "air.gusts": gust or None}
+    return _given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
 
 
 def _processors() -> int:
