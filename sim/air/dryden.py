@@ -1,4 +1,4 @@
-"""Dryden turbulence at low altitude (MIL-F-8785C, sections 3.7.2.2 and 3.7.3.4; MIL-HDBK-1797, appendix A, 4.9).
+"""Dryden turbulence at low altitude (MIL-F-8785C, section 3.7; MIL-HDBK-1797, section 4.9).
 
 One-sided spectra over the spatial frequency Omega [rad/m]; sigma^2 is their integral from 0 to infinity:
 
@@ -32,7 +32,7 @@ import numpy as np
 from estimator.jit import kernel
 
 KNOT_M_S = 1852.0 / 3600.0
-SEVERITIES_M_S: Final = {  # W20 of the words of MIL-F-8785C, section 3.7.3.4
+SEVERITIES_M_S: Final = {  # W20 of the words of MIL-F-8785C: 15, 30 and 45 knots
     "calm": 0.0,
     "light": round(15.0 * KNOT_M_S, 2),
     "moderate": round(30.0 * KNOT_M_S, 2),

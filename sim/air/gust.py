@@ -1,4 +1,4 @@
-"""Discrete gusts of the 1-cosine shape (MIL-F-8785C, section 3.7.1.3).
+"""Discrete gusts of the 1-cosine shape (MIL-F-8785C, section 3.7).
 
 The standard's gust rises to its peak as (1 - cos) / 2; two of them, the second the other way, make the whole wave
 that is flown here (as in 14 CFR 25.341):

@@ -2,8 +2,8 @@
 
     W(h) = W(10 m) (h / 10 m)^shear
 
-with an exponent of 0.10 over water, 0.14 over open country (the "one-seventh power"), 0.22 over suburbs and 0.33
-over a town (Davenport, 1960; ASCE 7).  An exponent of 0 is the same wind at every height.
+Over open country the exponent is about 0.14, the "one-seventh power"; over water it is nearer to 0.1, over suburbs and
+woods 0.2 to 0.3.  An exponent of 0 is the same wind at every height.
 """
 
 from typing import Final

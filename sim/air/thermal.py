@@ -94,7 +94,7 @@ def mean_updraft_m_s(height_m, inversion_m, strength_m_s):  # type: ignore[no-un
 
 @kernel
 def bell(r, ratio):  # type: ignore[no-untyped-def]
-    """Updraft at `r` outer radii over that at the centre, for r1 / r2 = `ratio` (equations 14 and 15)."""
+    """Updraft at `r` outer radii over that at the centre, for r1 / r2 = `ratio` (equation 16)."""
     last = RATIOS.shape[0] - 2
     at = min(max((ratio - RATIOS[0]) / (RATIOS[1] - RATIOS[0]), 0.0), last + 1.0)  # the ratios are evenly spaced
     i = min(int(at), last)
@@ -117,7 +117,7 @@ def updraft_m_s(north_m, east_m, height_m, places, strength_m_s, inversion_m, ar
         nearest2 = min(nearest2, (north_m - places[i, 0]) ** 2 + (east_m - places[i, 1]) ** 2)
     x, r2 = height_m / inversion_m, radius_m(height_m, inversion_m)
     ratio = min(0.0011 * r2 + 0.14, 0.8)  # equation 13
-    peak = 3.0 * mean * (1.0 - ratio) / (1.0 - ratio**3)  # equation 14: the trapezoid's mean is `mean`
+    peak = 3.0 * mean * (1.0 - ratio) / (1.0 - ratio**3)  # so that the trapezoid's mean is `mean`
     r = np.sqrt(nearest2) / r2
     edge_share = 2.5 * (x - 0.5) if 0.5 < x <= 0.9 else 0.0  # of the sink that falls around the column, equation 18
     edge = edge_share * min(0.0, np.pi / 6.0 * np.sin(np.pi * r)) if ratio < r < 2.0 else 0.0  # equation 17

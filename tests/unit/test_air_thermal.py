@@ -20,7 +20,7 @@ def updraft(r_m, height_m, places=ONE):
 
 
 def by_hand(height_m):
-    """Outer radius, ratio of radii, mean updraft and that at the centre (equations 11 to 14)."""
+    """Outer radius, ratio of radii, mean updraft and that at the centre (equations 11 to 13)."""
     x = height_m / INVERSION_M
     r2 = max(10.0, 0.102 * x ** (1 / 3) * (1 - 0.25 * x) * INVERSION_M)
     r1 = r2 * min(0.8, 0.0011 * r2 + 0.14)
