@@ -7,9 +7,9 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from sim.aircraft.endurance.aero import Aero, lift_slope, plate_normal
 
 from sim.aircraft.endurance import build
-from sim.aircraft.endurance.aero import Aero, lift_slope, plate_normal
 
 
 @pytest.fixture(scope="module")
