@@ -81,13 +81,48 @@ def test_stall_speed_in_a_slow_deceleration_is_of_the_class(plant):
     assert 6.5 < slowest < 7.5
 
 
-def test_full_up_elevator_at_idle_mushes_down_stalled(plant):
-    """Held fully up with the motor off it sinks wings level, stalled, and no faster than a parachute of its size."""
-    rows = fly(plant, 14.0, lambda _t, row: ActuatorCommand(level(row), 1.0, 0.0, 0.0))[-200:]
-    assert np.degrees(rows["alpha_rad"]).min() > 12.0  # measured 15
-    sink = rows["v_e_m_s"][:, 2].mean()
-    assert 2.0 < sink < 5.0  # measured 2.8
-    assert np.abs(bank_deg(rows)).max() < 5.0
+def test_full_up_elevator_at_idle_stalls_again_and_again_and_sinks_slowly(plant):
+    """Held fully up with the motor off it bucks, deep in the stall each time, wings level as long as they are flown."""
+    rows = fly(plant, 14.0, lambda _t, row: ActuatorCommand(level(row), 1.0, 0.0, 0.0))
+    assert np.degrees(rows["alpha_rad"]).max() > 40.0  # measured 103
+    sink = (rows["p_e_m"][-1, 2] - rows["p_e_m"][100, 2]) / 12.0
+    assert 1.0 < sink < 5.0  # measured 2.2
+    assert np.abs(bank_deg(rows)).max() < 10.0
+
+
+def turn(plant, elevator):
+    """Rows after 5 s of a turn at idle that the ailerons have held; they stay where they are, the elevator as given."""
+    log = Log.empty(350)
+    plant.reset(log)
+    bank = math.radians(30.0)
+    speed = plant.trimmed.airspeed_m_s * np.array([1.0, 0.0, 0.016])
+    plant.begin((0.0, 0.0, -HEIGHT_M), (bank, plant.trimmed.alpha_rad, 0.0), speed, command=plant.trimmed.command)
+    aileron = 0.0
+    for k in range(len(log)):
+        row, t = log.truth[max(k - 1, 0)], k * plant.dt_s
+        if t < 5.0:
+            roll = math.atan2(row["R_eb"][2, 1], row["R_eb"][2, 2]) if k else bank
+            aileron = float(np.clip(2.0 * (bank - roll) - 0.3 * row["omega_b_rad_s"][0], -1.0, 1.0))
+        up = min(0.45, 0.1 + 0.08 * t) if t < 5.0 else elevator
+        assert plant.advance(k, ActuatorCommand(aileron, up, 0.0, 0.0)) is None
+    return log.truth[250:]
+
+
+def test_stalled_turn_departs_and_a_normal_one_does_not(plant):
+    """Full up elevator in a slow turn at idle drops a wing at once; without it the turn goes on as it was."""
+    normal, stalled = turn(plant, 0.45), turn(plant, 1.0)
+    assert np.degrees(stalled["alpha_rad"]).max() > 12.0
+    assert np.abs(bank_deg(stalled) - bank_deg(stalled)[0]).max() > 25.0  # measured 35
+    assert np.abs(stalled["omega_b_rad_s"][:, 0]).max() > 1.0  # measured 1.7
+    assert np.abs(bank_deg(normal) - bank_deg(normal)[0]).max() < 5.0  # measured 1
+    assert np.abs(normal["omega_b_rad_s"][:, 0]).max() < 0.1
+
+
+def test_slow_stall_rocks_the_wings_against_the_ailerons(plant):
+    """Slowed to the stall with the wings held level, it begins to rock past 40 degrees of bank (measured 70)."""
+    rows = fly(plant, 20.0, lambda t, row: ActuatorCommand(level(row), min(1.0, 0.08 * t), 0.0, 0.0))
+    assert np.abs(bank_deg(rows[:300])).max() < 2.0
+    assert np.abs(bank_deg(rows)).max() > 40.0
 
 
 def test_glide_with_the_motor_off_is_of_the_class(plant):
@@ -113,6 +148,50 @@ def test_static_thrust_is_of_the_class(plant):
     plant.model.place(10.0, (0.0, 0.0, 0.0), np.zeros(3), (0.0,) * 3, ActuatorCommand(0, 0, 0, 1.0), plant.air, 400)
     thrust_n = 4.4482216 * plant.model.get("propulsion/engine/thrust-lbs")[0]
     assert 8.0 < thrust_n < 9.0
+
+
+def place(plant, throttle, speed=12.0):
+    """The model at `speed`, level at alpha 0, elevator full up and rudder full right, motor settled at `throttle`."""
+    command = ActuatorCommand(0.0, 1.0, 1.0, throttle)
+    plant.model.place(60.0, (0.0, 0.0, 0.0), np.array([speed, 0.0, 0.0]), (0.0,) * 3, command, plant.air, 400)
+
+
+def test_slipstream_adds_to_elevator_and_rudder_as_momentum_theory_says(plant):
+    """Dynamic pressure q + thrust / disc area on the part of tailplane and fin that stands in the slipstream."""
+    get = plant.model.getter
+    place(plant, 1.0)
+    thrust_n = 4.4482216 * get("propulsion/engine/thrust-lbs")()
+    q_pa = 47.880259 * get("aero/qbar-psf")()
+    disc_m2 = 0.25 * np.pi * plant.airframe["geometry"]["propeller_diameter_m"] ** 2
+    powered = get("aero/moment/pitch-elevator")(), get("aero/moment/yaw-rudder")()
+    place(plant, 0.0)
+    idle = get("aero/moment/pitch-elevator")(), get("aero/moment/yaw-rudder")()
+    assert powered[0] / idle[0] == pytest.approx(1.0 + 0.4 * thrust_n / disc_m2 / q_pa, rel=1e-3)
+    assert powered[1] / idle[1] == pytest.approx(1.0 + 0.5 * thrust_n / disc_m2 / q_pa, rel=1e-3)
+    assert 1.3 < powered[0] / idle[0] < 1.8
+
+
+def test_stopped_propeller_brakes_and_a_windmilling_one_pulls_back(plant):
+    """With the throttle shut the blades stop: 45 cm2 of drag area; turning slower than the air they pull back."""
+    get = plant.model.getter
+    place(plant, 0.0)
+    assert get("propulsion/engine/propeller-rpm")() < 1.0
+    drag_n = 4.4482216 * get("aero/force/drag-propeller")()
+    assert drag_n == pytest.approx(0.0045 * 47.880259 * get("aero/qbar-psf")(), rel=1e-6)
+    place(plant, 0.25, speed=18.0)
+    assert get("propulsion/engine/thrust-lbs")() < -0.05
+    assert get("aero/force/drag-propeller")() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_motor_torque_rolls_against_the_propeller(plant):
+    """The whole power goes into a torque on the airframe, P / omega, that rolls to the left (right-hand propeller)."""
+    place(plant, 1.0)
+    get = plant.model.getter
+    power_w = 745.69987 * get("propulsion/engine/power-hp")()
+    omega = get("propulsion/engine/propeller-rpm")() * np.pi / 30.0
+    moment_nm = 1.3558179 * get("moments/l-prop-lbsft")()
+    assert moment_nm < -0.05
+    assert moment_nm == pytest.approx(-power_w / omega, rel=0.1)  # losses in the windings are part of the power
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
