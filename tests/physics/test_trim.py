@@ -107,7 +107,6 @@ def test_level_turn_is_pulled_round_by_its_forces(model, bank_deg):
 
 
 @pytest.mark.parametrize("bank_deg", [-30.0, 30.0, 45.0])
-@pytest.mark.xfail(strict=True, reason="the model has no side force of yawing to balance the rudder's: 3 % too slow")
 def test_level_turn_without_sideslip_follows_the_bank(model, bank_deg):
     """tan(bank) = V * rate / g within 2 %: fin and rudder, opposed in moment, are opposed in force as well."""
     t = trim(model, 14.0, HEIGHT_M, bank_rad=math.radians(bank_deg))
