@@ -22,7 +22,7 @@ from estimator.interface import Array
 from sim.linear import ASYMMETRIC, SYMMETRIC, LinearModel, Mode, derivative
 
 if TYPE_CHECKING:
-    from sim.jsbsim_plant import Model
+    from sim.jsbsim_model import Model
 
 G_M_S2 = 9.80665
 U, V, W, P, Q, R, ROLL, PITCH = range(8)

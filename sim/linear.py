@@ -27,7 +27,7 @@ from estimator.interface import Array
 from sim.trim import Trim, earth_to_body, settled
 
 if TYPE_CHECKING:
-    from sim.jsbsim_plant import Model
+    from sim.jsbsim_model import Model
 
 STATES = ("u", "v", "w", "p", "q", "r", "roll", "pitch", "yaw", "north", "east", "down")
 INPUTS = ("aileron", "elevator", "rudder", "throttle")

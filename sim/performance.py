@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
 from sim.trim import Search, Trim, settled, surfaces, trim
 
 if TYPE_CHECKING:
-    from sim.jsbsim_plant import Model
+    from sim.jsbsim_model import Model
 
 STEP_RAD = math.radians(0.25)
 FASTEST = 3.0  # times the stall speed: where the polar ends

@@ -26,7 +26,7 @@ from estimator.interface import Array
 from sim.air import STILL
 
 if TYPE_CHECKING:
-    from sim.jsbsim_plant import Model
+    from sim.jsbsim_model import Model
 
 TOLERANCE = 1e-10  # of the accelerations, m/s2 and rad/s2; JSBSim's round-off leaves about 1e-12
 G_M_S2 = 9.81  # for first guesses alone

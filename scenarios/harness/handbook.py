@@ -12,7 +12,7 @@ from typing import Any
 from scenarios.harness import console
 from sim import performance
 from sim.derivatives import Airframe, coefficients, lanchester, textbook
-from sim.jsbsim_plant import Model
+from sim.jsbsim_model import Model
 from sim.linear import LinearModel, Mode, linearise, modes
 from sim.performance import Performance, radius_m
 from sim.trim import Trim

@@ -7,7 +7,8 @@ import pytest
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
 from sim.air import Air, Gust, MovingAir, Thermals
-from sim.jsbsim_plant import AIR_RATES, JsbsimPlant, Model
+from sim.jsbsim_model import Model
+from sim.jsbsim_plant import AIR_RATES, JsbsimPlant
 from sim.log import Log, Phase
 from sim.plant import HandThrow, InFlight
 

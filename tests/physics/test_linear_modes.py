@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.optimize import curve_fit
 
 from sim.derivatives import Airframe, coefficients, lanchester, textbook
-from sim.jsbsim_plant import AIRCRAFT, Model
+from sim.jsbsim_model import AIRCRAFT, Model
 from sim.linear import ASYMMETRIC, HEIGHT, STATES, SYMMETRIC, LinearModel, linearise, modes
 from sim.performance import measure
 from sim.trim import Trim, trim

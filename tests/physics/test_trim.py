@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from sim.air import Air
-from sim.jsbsim_plant import AIRCRAFT, JsbsimPlant, Model, rotation_of
+from sim.jsbsim_model import AIRCRAFT, Model
+from sim.jsbsim_plant import JsbsimPlant, rotation_of
 from sim.log import Log
 from sim.plant import InFlight
 from sim.trim import Trim, accelerations, earth_to_body, surfaces, trim
