@@ -55,7 +55,7 @@ SCENARIO = Scenario(
             "heading error RMS",
             "deg",
             over(heading_error_deg(), rms, SETTLED, judged_share=0.9),
-            3.0,  # 1.3, 1.7 left
+            3.0,  # 1.2, 1.8 left
             pooled="rms",
             per_flight_limit=4.5,
         ),
