@@ -3,6 +3,7 @@
 Needs a Vulkan driver; a processor will do (Debian: mesa-vulkan-drivers).
 """
 
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -11,21 +12,26 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from sim.viewer import executable, free_port
+from sim.viewer import await_port, executable, free_port
 
 recording, seconds, picture = Path(sys.argv[1]).resolve(), float(sys.argv[2]), Path(sys.argv[3])
-with (
-    TemporaryDirectory() as folder,
-    ViewerClient.spawn(
-        headless=True, port=free_port(), hide_welcome_screen=True, executable_path=str(executable())
-    ) as viewer,
-):
-    viewer.open(str(recording))
+port = free_port()
+# `ViewerClient.spawn` would listen on every interface of the machine.
+viewer = subprocess.Popen(
+    [executable(), "--headless", "--hide-welcome-screen", "--bind", "127.0.0.1", "--port", str(port)]
+)
+try:
+    await_port(viewer, port)
+    client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+    client.open(str(recording))
     time.sleep(3.0)  # it loads and compiles
-    viewer.set_time("sim_time", duration=seconds, play_state="paused")
+    client.set_time("sim_time", duration=seconds, play_state="paused")
     time.sleep(2.0)  # it settles: then the same picture comes again, byte by byte
-    viewer.save_screenshot(f"{folder}/screen.png")
-    image = Image.open(f"{folder}/screen.png").convert("RGB")
+    with TemporaryDirectory() as folder:
+        client.save_screenshot(f"{folder}/screen.png")
+        image = Image.open(f"{folder}/screen.png").convert("RGB")
+finally:
+    viewer.terminate()
 image = image.crop((0, 36, *image.size))  # without the empty bar on top
 image = image.resize((1600, round(1600 * image.height / image.width)), Image.Resampling.LANCZOS)
 image.save(picture, quality=86, subsampling=0, optimize=True)
