@@ -1,14 +1,14 @@
 """The autopilot that steers on the direction cosine matrix: its modes, its state, and one kernel per tick."""
 
 import math
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.airframes import AutopilotParams, params_of
 from autopilot.guidance import (
-    GuidanceParams,
     bank_for_heading,
     bank_to_return,
     direction_of_travel,
@@ -19,22 +19,12 @@ from autopilot.guidance import (
     unseen_turn,
 )
 from autopilot.interface import ActuatorCommand, Mode, Setpoint
-from autopilot.launch import LaunchParams, climb_away, feel_throw
-from autopilot.mixer import MixerParams, mix
-from autopilot.stabilise import StabiliseParams, rate_control, rate_demand
+from autopilot.launch import climb_away, feel_throw
+from autopilot.mixer import mix
+from autopilot.stabilise import rate_control, rate_demand
 from estimator.interface import AttitudeEstimate, HeadingReference, Measurements
 from estimator.jit import kernel
 from estimator.kernels import clip
-
-
-@dataclass(frozen=True, slots=True)
-class AutopilotParams:
-    """All gains and limits, a group for each part."""
-
-    stabilise: StabiliseParams = field(default_factory=StabiliseParams)
-    guidance: GuidanceParams = field(default_factory=GuidanceParams)
-    launch: LaunchParams = field(default_factory=LaunchParams)
-    mixer: MixerParams = field(default_factory=MixerParams)
 
 
 def _floats(params: type[Any]) -> np.dtype[Any]:
@@ -91,11 +81,12 @@ def guide(R_eb, wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
         pitch, throttle = climb_away(thrown_s, asked.height_m, row, s, me.p.launch, p, dt_s)
         return 0.0, pitch, throttle
     north, east = direction_of_travel(R_eb, wind_e_m_s, row, s, me.on_nose, p)
+    limit_rad = min(asked.bank_limit_rad, p.bank_limit_rad)
     if s.mode == RETURN:
-        bank = bank_to_return(north, east, R_eb[2, 1], row, s, asked.bank_limit_rad, p)
+        bank = bank_to_return(north, east, R_eb[2, 1], row, s, limit_rad, p)
     else:
         sine, cosine = heading_error(north, east, math.cos(asked.course_rad), math.sin(asked.course_rad))
-        bank = bank_for_heading(sine, cosine, R_eb[2, 1], asked.bank_limit_rad, p)
+        bank = bank_for_heading(sine, cosine, R_eb[2, 1], limit_rad, p)
     pitch, throttle = hold_height(asked.height_m, row, s, p, dt_s)
     return bank, pitch, throttle
 
@@ -152,21 +143,25 @@ class DcmAutopilot:
     """Stabilises and leads the aeroplane on the direction cosine matrix (Premerlani & Bizard).
 
     Needs no airspeed and no barometer: speed is guarded by pitch limits and by a throttle that follows the
-    climb demand; height and position come from the GPS.  In flight it never raises; an attitude that is not
-    finite gets neutral controls, motor off.
+    climb demand, or, without a motor, by the pitch of the glide; height and position come from the GPS.  In
+    flight it never raises; an attitude that is not finite gets neutral controls, motor off.
 
     Parameters
     ----------
-    params              gains and limits
+    params              gains and limits; None is those of the aircraft
     heading_reference   what the first column of the estimator's matrix points along: the "course" over the
                         ground, or the "nose", which is steered by with the estimated wind; may be set later
                         and holds from the next `reset` on
+    aircraft            name of what is flown, see `autopilot.airframes`; ValueError where nobody has tuned for it
     """
 
     def __init__(
-        self, params: AutopilotParams | None = None, heading_reference: HeadingReference = "course"
+        self,
+        params: AutopilotParams | None = None,
+        heading_reference: HeadingReference = "course",
+        aircraft: str = "endurance",
     ) -> None:
-        self.params = params or AutopilotParams()
+        self.params = params or params_of(aircraft)
         self.heading_reference = heading_reference
         self.reset()
 

@@ -20,6 +20,7 @@ class GuidanceParams:
     """How the aeroplane is led; the defaults fly the aeroplane `endurance` on a GPS that is 1.3 s late.
 
     bank_per_heading : bank demanded per unit of sine of the heading error; larger is quicker, then weaves
+    bank_limit_rad : the steepest bank ever demanded to turn, whatever the set-point allows
     airspeed_m_s : of cruise, to turn a nose direction and a wind into a direction over the ground
     gps_filter_s : age of a fix beyond its time stamp, from the filter inside the receiver
     gps_patience_s : age of a fix after which it is no longer believed
@@ -33,6 +34,7 @@ class GuidanceParams:
     """
 
     bank_per_heading: float = 1.2
+    bank_limit_rad: float = math.radians(85.0)
     airspeed_m_s: float = 12.6
     gps_filter_s: float = 1.0
     gps_patience_s: float = 5.0

@@ -11,22 +11,26 @@ class MixerParams:
     """Trim and mixing.
 
     aileron_trim, elevator_trim, rudder_trim : deflection of hands-off level flight at cruise, -1..1
-    rudder_per_aileron : rudder that goes with aileron, against its adverse yaw
-    surface_limit : 0..1, the most of its travel that a surface is given
+    rudder_per_roll : rudder that goes with roll control: against the adverse yaw of ailerons, or, where there are
+        none, all of it: the rudder slips the aeroplane, and the dihedral rolls it out of the slip
+    aileron_limit, elevator_limit, rudder_limit, throttle_limit : 0..1, the most of its travel that each is given;
+        0 where it is not fitted
     """
 
     aileron_trim: float = 0.0
     elevator_trim: float = 0.0
     rudder_trim: float = 0.0
-    rudder_per_aileron: float = 0.4
-    surface_limit: float = 1.0
+    rudder_per_roll: float = 0.4
+    aileron_limit: float = 1.0
+    elevator_limit: float = 1.0
+    rudder_limit: float = 1.0
+    throttle_limit: float = 1.0
 
 
 @kernel
 def mix(roll, pitch, yaw, throttle, p):  # type: ignore[no-untyped-def]
     """Surfaces -1..1 (roll right, nose up, nose right) and throttle 0..1.  p : record of MixerParams."""
-    limit = p.surface_limit
-    aileron = clip(p.aileron_trim + roll, -limit, limit)
-    elevator = clip(p.elevator_trim + pitch, -limit, limit)
-    rudder = clip(p.rudder_trim + yaw + p.rudder_per_aileron * roll, -limit, limit)
-    return aileron, elevator, rudder, clip(throttle, 0.0, 1.0)
+    aileron = clip(p.aileron_trim + roll, -p.aileron_limit, p.aileron_limit)
+    elevator = clip(p.elevator_trim + pitch, -p.elevator_limit, p.elevator_limit)
+    rudder = clip(p.rudder_trim + yaw + p.rudder_per_roll * roll, -p.rudder_limit, p.rudder_limit)
+    return aileron, elevator, rudder, clip(throttle, 0.0, p.throttle_limit)

@@ -27,7 +27,8 @@ class StabiliseParams:
     airspeed_m_s : of cruise; stands in for the airspeed nobody measures
     roll_gain_1_s, pitch_gain_1_s : rate demanded per sine of the error; larger is quicker, then nervous
     roll_rate_limit_rad_s, pitch_rate_limit_rad_s : the most the outer loop asks for
-    aileron_per_roll_rate_s, .._per_rate_error_s, .._per_roll_error : feed-forward, damping, integral
+    roll_control_per_rate_s, .._per_rate_error_s, .._per_error : feed-forward, damping, integral; what moves, ailerons
+        or a rudder that rolls by way of the dihedral, is the mixer's business
     elevator_per_pitch_rate_s, .._per_rate_error_s, .._per_pitch_error : the same
     elevator_per_load : up-elevator per extra g of lift        load_limit : the extra g it answers to at most
     rudder_per_yaw_rate_s, rudder_per_rate_error_s : feed-forward and damping; no integral
@@ -39,9 +40,9 @@ class StabiliseParams:
     roll_rate_limit_rad_s: float = 1.5
     pitch_gain_1_s: float = 2.5
     pitch_rate_limit_rad_s: float = 0.8
-    aileron_per_roll_rate_s: float = 0.3
-    aileron_per_rate_error_s: float = 0.12
-    aileron_per_roll_error: float = 0.12
+    roll_control_per_rate_s: float = 0.3
+    roll_control_per_rate_error_s: float = 0.12
+    roll_control_per_error: float = 0.12
     elevator_per_pitch_rate_s: float = 0.25
     elevator_per_rate_error_s: float = 0.35
     elevator_per_pitch_error: float = 1.0
@@ -139,7 +140,7 @@ def rate_control(demand, R_eb, omega_b_rad_s, s, p, dt_s):  # type: ignore[no-un
     roll_missing = demand[0] - omega_b_rad_s[0]
     pitch_missing = demand[1] - omega_b_rad_s[1]
     yaw_missing = demand[2] - omega_b_rad_s[2]
-    roll = p.aileron_per_roll_rate_s * demand[0] + p.aileron_per_rate_error_s * roll_missing + s.roll_integral
+    roll = p.roll_control_per_rate_s * demand[0] + p.roll_control_per_rate_error_s * roll_missing + s.roll_integral
     pitch = (
         p.elevator_per_load * extra_load(demand[1], R_eb[2, 2], p)
         + p.elevator_per_pitch_rate_s * demand[1]
@@ -148,6 +149,6 @@ def rate_control(demand, R_eb, omega_b_rad_s, s, p, dt_s):  # type: ignore[no-un
     )
     yaw = p.rudder_per_yaw_rate_s * demand[2] + p.rudder_per_rate_error_s * yaw_missing
     limit = p.integral_limit
-    s.roll_integral = hold(s.roll_integral, roll_missing, p.aileron_per_roll_error, roll, limit, dt_s)
+    s.roll_integral = hold(s.roll_integral, roll_missing, p.roll_control_per_error, roll, limit, dt_s)
     s.pitch_integral = hold(s.pitch_integral, pitch_missing, p.elevator_per_pitch_error, pitch, limit, dt_s)
     return roll, pitch, yaw

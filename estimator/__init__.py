@@ -15,7 +15,8 @@ Names
 -----
 A name reads quantity, frame, unit: ``omega_b_rad_s``, ``v_e_m_s``, ``p_e_m``, ``t_s``.  Rotations and
 fractions carry no unit.  Inside: SI and radians.  Degrees live in configuration and in what a person reads,
-always with the suffix; feet and pounds live in ``sim/jsbsim_plant.py`` and end there.
+always with the suffix; feet and pounds live in ``sim/jsbsim_model.py`` and
+``sim/jsbsim_plant.py`` and end there.
 
 Signs
 -----

@@ -85,6 +85,8 @@ def _as_floats(value: Any) -> Array:
 
 def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> None:
     """Write estimate `e` into row `k` of `flown`; Unusable where it is none."""
+    if e.__class__ is not AttitudeEstimate:
+        raise Unusable(f"update() returned {type(e).__name__}, must return an AttitudeEstimate")
     R_eb, omega, bias, wind, health = e
     if wind is None:
         wind = _UNKNOWN_WIND
@@ -99,6 +101,8 @@ def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> None:
 
 def record_command(flown: NDArray[Any], k: int, command: ActuatorCommand) -> None:
     """Write `command` into row `k` of `flown`; Unusable where it is not finite."""
+    if command.__class__ is not ActuatorCommand:
+        raise Unusable(f"update() returned {type(command).__name__}, must return an ActuatorCommand")
     if not _record_command(flown, k, *command):
         raise Unusable(f"the command is not finite: {tuple(float(c) for c in command[:4])}")
 
@@ -118,9 +122,7 @@ def _failure(outcome: Outcome, who: object, t_s: float, error: Exception) -> Fli
     return FlightCodeFailed(outcome, who, t_s, fault)
 
 
-def estimate_of(
-    estimator: AttitudeEstimator, measured: Measurements, flown: NDArray[Any], k: int
-) -> AttitudeEstimate:
+def estimate_of(estimator: AttitudeEstimator, measured: Measurements, flown: NDArray[Any], k: int) -> AttitudeEstimate:
     """Ask the estimator for tick `k` and record what it says; FlightCodeFailed where that is unusable."""
     try:
         estimate = estimator.update(measured)

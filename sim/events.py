@@ -1,5 +1,7 @@
 """What happened in a flight, read from its log afterwards: phases, modes, the GPS, the end."""
 
+from typing import Literal
+
 import numpy as np
 
 from autopilot.interface import Mode
@@ -38,6 +40,6 @@ def events_of(log: Log, outcome: Outcome, message: str) -> tuple[Event, ...]:
             if i + 1 < len(fixes):
                 events.append(Event(float(t_s[fixes[i + 1]]), "GPS back"))
     if outcome != Outcome.COMPLETED:
-        level = "warn" if outcome == Outcome.INTERRUPTED else "error"
+        level: Literal["warn", "error"] = "warn" if outcome == Outcome.INTERRUPTED else "error"
         events.append(Event(float(t_s[-1]), message or outcome.replace("_", " "), level))
     return tuple(sorted(events, key=lambda e: e.t_s))

@@ -1,4 +1,4 @@
-"""JSBSim behind the Plant protocol: the only place that knows JSBSim, feet and pounds.
+"""JSBSim behind the Plant protocol.
 
 A tick is four writes, a few physics steps with no reads between them, and one packed read that a kernel turns
 into the truth row in SI units.  The inertial means of the row come from the change of attitude and velocity
@@ -6,36 +6,22 @@ over the tick (`sim.truth.integrate_imu`).
 """
 
 import math
-import tomllib
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from struct import Struct
-from typing import Any
 
-import jsbsim
 import numpy as np
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
 from estimator.interface import Array
 from estimator.jit import kernel
 from sim import hand
-from sim.air import STILL, Air
+from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
+from sim.jsbsim_model import FT_TO_M, LATITUDE_DEG, LB_TO_N, LONGITUDE_DEG, WIND, WRITE, Model
 from sim.log import Log, Outcome, Phase
 from sim.plant import HandThrow, InFlight, Start
-from sim.rng import stream
 from sim.trim import Trim, trim
-from sim.truth import EARTH_RATE_RAD_S, earth_rate_e_rad_s, gravity_m_s2, integrate_imu
-
-FT_TO_M = 0.3048
-LB_TO_N = 4.4482216152605
-LBFT_TO_NM = LB_TO_N * FT_TO_M
-SLUG_TO_KG = LB_TO_N / FT_TO_M
-SLUGFT2_TO_KGM2 = SLUG_TO_KG * FT_TO_M**2
-
-AIRCRAFT = Path(__file__).parent / "aircraft"
-LATITUDE_DEG, LONGITUDE_DEG = 42.80, -73.95  # the launch point, at sea level
+from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
 
 # What is read after each tick: field of the state record, its JSBSim properties.
 READ: dict[str, tuple[str, ...]] = {
@@ -48,11 +34,8 @@ READ: dict[str, tuple[str, ...]] = {
     "motor": ("propulsion/engine/propeller-rpm", "propulsion/engine/thrust-lbs"),
     "contact": ("forces/fbz-gear-lbs",),
 }
-WRITE = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
-INTEGRATORS = tuple(f"simulation/integrator/{a}" for a in (
-    "rate/rotational", "rate/translational", "position/rotational", "position/translational",
-))  # fmt: skip
-
+# Rates of the air, which an aeroplane's damping terms take off its own (JSBSim's own turbulence rates cannot be set).
+AIR_RATES = tuple(f"gust/{a}-rad_sec" for a in "pqr")
 STATE_DTYPE = np.dtype(
     [
         *((name, "f8", (len(properties),)) for name, properties in READ.items()),  # packed into its first bytes
@@ -77,16 +60,6 @@ class FlightBox:
 
     radius_m: float = 3000.0
     height_m: float = 1000.0
-
-
-class _Silent(jsbsim.FGLogger):
-    """JSBSim's console output, dropped."""
-
-    def message(self, _text: str) -> None:
-        return
-
-
-_SILENT = _Silent()
 
 
 @kernel
@@ -148,129 +121,6 @@ def observe(truth, k, state):  # type: ignore[no-untyped-def]
     return 0
 
 
-class Model:
-    """One JSBSim aeroplane in SI units: loading, placing, wind; each property name is resolved once."""
-
-    def __init__(self, aircraft: str, physics_hz: int) -> None:
-        self.folder = AIRCRAFT / aircraft
-        known = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
-        if aircraft not in known:
-            raise ValueError(f"unknown aircraft '{aircraft}': choose {', '.join(known)}")
-        self.airframe: dict[str, Any] = tomllib.loads((self.folder / "airframe.toml").read_text())
-        self.dt_s = 1.0 / physics_hz
-        jsbsim.set_logger(_SILENT)  # anew for each model: JSBSim keeps a logger per thread
-        self.fdm = jsbsim.FGFDMExec(None)
-        self.fdm.set_dt(self.dt_s)  # before the model: the servos' lags are worked out while loading
-        if not self.fdm.load_model_with_paths(aircraft, str(AIRCRAFT), str(self.folder), str(self.folder)):
-            raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")
-        self.run = self.fdm.run
-        self._properties = self.fdm.get_property_manager()
-        self._integrators = [(self.setter(p), self.getter(p)()) for p in INTEGRATORS]
-
-    def _node(self, name: str) -> Any:
-        node = self._properties.get_node(name)
-        if node is None:
-            raise ValueError(f"JSBSim has no property '{name}' in the aircraft '{self.folder.name}'")
-        return node
-
-    def getter(self, name: str) -> Callable[[], float]:
-        """Bound method that reads the property `name`, in JSBSim's unit."""
-        return self._node(name).get_double_value  # type: ignore[no-any-return]
-
-    def setter(self, name: str) -> Callable[[float], None]:
-        """Bound method that writes the property `name`, in JSBSim's unit."""
-        return self._node(name).set_double_value  # type: ignore[no-any-return]
-
-    def get(self, *names: str) -> Array:
-        return np.array([self.getter(name)() for name in names])
-
-    def put(self, values: dict[str, float]) -> None:
-        """Write properties, in JSBSim's units and in the order given."""
-        for name, value in values.items():
-            self.setter(name)(value)
-
-    def mass_kg(self) -> float:
-        return float(self.get("inertia/mass-slugs")[0]) * SLUG_TO_KG
-
-    def inertia_kg_m2(self) -> Array:
-        """Principal moments of inertia, shape (3,)."""
-        return SLUGFT2_TO_KGM2 * self.get(*(f"inertia/i{a}{a}-slugs_ft2" for a in "xyz"))
-
-    def force_and_moment(self) -> tuple[Array, Array]:
-        """All forces but gravity [N] and all moments [N m] on the body in the last step, body axes."""
-        force = LB_TO_N * self.get(*(f"forces/fb{a}-total-lbs" for a in "xyz"))
-        return force, LBFT_TO_NM * self.get(*(f"moments/{a}-total-lbsft" for a in "lmn"))
-
-    def accelerations(self) -> Array:
-        """Rates of change of the body velocity [m/s2] and of the body rates [rad/s2], shape (6,)."""
-        linear = FT_TO_M * self.get(*(f"accelerations/{a}dot-ft_sec2" for a in "uvw"))
-        return np.concatenate([linear, self.get(*(f"accelerations/{a}dot-rad_sec2" for a in "pqr"))])
-
-    def coming_rates(self) -> Array:
-        """Body rates [rad/s] that the next step will reach: what the last one has computed."""
-        rates = self.get(*(f"velocities/{a}-rad_sec" for a in "pqr"))
-        return rates + self.dt_s * self.accelerations()[3:]
-
-    def place(
-        self, height_m: float, euler_rad: tuple[float, float, float], v_b_m_s: Array,
-        omega_b_rad_s: tuple[float, float, float], command: ActuatorCommand, air: Air, settle: int,
-    ) -> None:  # fmt: skip
-        """Start anew above the launch point: velocity over the ground in body axes, servos at `command`, steady wind.
-
-        Then the motion is frozen for `settle` steps (at least 1), in which the propeller finds its speed.
-        """
-        # The frozen motion is at rest in inertial space: the earth turns on below it, to the launch point.
-        ahead_deg = math.degrees(EARTH_RATE_RAD_S * settle * self.dt_s)
-        self.put({"ic/lat-geod-deg": LATITUDE_DEG, "ic/long-gc-deg": LONGITUDE_DEG + ahead_deg})
-        self.put({"ic/terrain-elevation-ft": 0.0})
-        self.put({"ic/h-agl-ft": height_m / FT_TO_M})
-        self.put(dict(zip(("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"), euler_rad, strict=True)))
-        self.put({f"ic/{a}-fps": float(v) / FT_TO_M for a, v in zip("uvw", v_b_m_s, strict=True)})
-        self.put({f"ic/{a}-rad_sec": w for a, w in zip("pqr", omega_b_rad_s, strict=True)})
-        self.put({"atmosphere/turb-type": 0.0})
-        self.push(np.zeros(3), np.zeros(3))
-        self.fdm.run_ic()  # forgets commands and wind
-        self.put(dict(zip(WRITE, command[:4], strict=True)))
-        names = (f"atmosphere/wind-{d}-fps" for d in ("north", "east", "down"))
-        self.put({name: w / FT_TO_M for name, w in zip(names, air.wind_e_m_s, strict=True)})
-        self.fdm.set_trim_status(True)  # servos jump to their commands
-        self.frozen(1)
-        self.fdm.set_trim_status(False)
-        self.frozen(settle - 1)
-
-    def frozen(self, steps: int) -> None:
-        """Run `steps` with the motion held: forces, servos and propeller go on."""
-        for write, _ in self._integrators:
-            write(0.0)
-        for _ in range(steps):
-            self.run()
-        for write, scheme in self._integrators:
-            write(scheme)
-
-    def remember(self, on: bool) -> None:
-        """Off: integrate the velocity without a memory of past accelerations, which would smear a force that jumps."""
-        write, scheme = self._integrators[1]
-        write(scheme if on else 1.0)
-
-    def stir(self, air: Air, seed: int) -> None:
-        """Start the turbulence of `air`: JSBSim's MIL-F-8785C, its own generator, started from `seed`.
-
-        JSBSim 1.3 turns the long-wave axis of winds between the cardinal directions to the wrong side; the
-        strength is right, and along the four directions all is.
-        """
-        if air.turbulence_w20_m_s > 0.0:
-            w20 = "atmosphere/turbulence/milspec/windspeed_at_20ft_AGL-fps"
-            self.put({"atmosphere/turb-type": 3.0, w20: air.turbulence_w20_m_s / FT_TO_M})
-            self.put({"atmosphere/turbulence/milspec/severity": 3.0, "atmosphere/randomseed": float(seed)})
-
-    def push(self, force_b_n: Array, moment_b_nm: Array) -> None:
-        """Set the force and the moment of the hand, body axes; they stay until set again."""
-        hand_force, moment = "external_reactions/hand", "external_reactions/hand_moment"
-        self.put({f"{hand_force}/{a}": float(f) / LB_TO_N for a, f in zip("xyz", force_b_n, strict=True)})
-        self.put({f"{moment}/{a}": float(m) / LBFT_TO_NM for a, m in zip("lmn", moment_b_nm, strict=True)})
-        self.put({f"{hand_force}/magnitude": 1.0, f"{moment}/magnitude-lbsft": 1.0})
-
-
 class JsbsimPlant:
     """An aeroplane flown by JSBSim.
 
@@ -278,9 +128,9 @@ class JsbsimPlant:
     ----------
     aircraft : name of a folder of `sim/aircraft`
     start : in the air or thrown by hand
-    air : wind and turbulence
+    air : wind, gusts, turbulence, thermals
     rates : physics and inertial rates
-    seed, flight : which random streams (the turbulence is the only one here)
+    seed, flight : which random streams (the turbulence alone draws any here)
     box : where the flight may be
 
     Raises ValueError for an unknown aircraft or a start that cannot be.
@@ -297,8 +147,6 @@ class JsbsimPlant:
         self.start, self.air = start, air
         self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
         self._physics_hz, self._aircraft = rates.physics_hz, aircraft
-        # JSBSim keeps the seed in a 32-bit signed integer.
-        self._turbulence_seed = int(stream(seed, flight, "turbulence").integers(1, 2**31 - 1))
         self._hold_ticks = self._release_tick = self._hand_ticks = 0
         if isinstance(start, HandThrow):
             hand.check(start)
@@ -307,6 +155,9 @@ class JsbsimPlant:
             self._hand_ticks = self._release_tick + 1  # the first tick of the flight puts its integrator away
         self.release_s = self._release_tick * self.dt_s
         self._load()
+        span_m = FT_TO_M * float(self.model.get("metrics/bw-ft")[0])
+        self._moving_air = MovingAir(air, span_m, self.dt_s, self.release_s, seed, flight)
+        self._air_moves = not air.is_steady
         self.airframe = self.model.airframe
         self.trimmed = Trim.of(self.airframe["cruise"])
         if isinstance(start, InFlight):
@@ -315,7 +166,7 @@ class JsbsimPlant:
                     f"height_m {start.height_m} m: must be above 0 and below 10000 m, with a finite heading"
                 )
             airspeed_m_s = self.trimmed.airspeed_m_s if start.airspeed_m_s is None else start.airspeed_m_s
-            self.trimmed = trim(self.model, airspeed_m_s, start.height_m)
+            self.trimmed = trim(self.model, airspeed_m_s, start.height_m, heading_rad=start.heading_rad)
         self._state = np.zeros(1, STATE_DTYPE)
         self._buffer = self._state.data
         latitude_rad = math.radians(LATITUDE_DEG)
@@ -324,10 +175,12 @@ class JsbsimPlant:
         s["dt_s"], s["box_radius_m"], s["box_height_m"] = self.dt_s, box.radius_m, box.height_m
 
     def _load(self) -> None:
-        """A JSBSim of its own for each flight: its turbulence filters and blown-up states outlive any reset."""
+        """A JSBSim of its own for each flight: blown-up states outlive any reset."""
         self.model = Model(self._aircraft, self._physics_hz)
         self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
         self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._wind = tuple(self.model.setter(p) for p in WIND)
+        self._air_rates = tuple(self.model.setter(p) for p in AIR_RATES if self.model.has(p))
         self._pack = Struct(f"{len(self._getters)}d").pack_into
 
     def reset(self, log: Log) -> None:
@@ -335,20 +188,22 @@ class JsbsimPlant:
         self._load()
         self._truth = log.truth
         s = self._state[0]
-        if isinstance(self.start, HandThrow):
-            rotation_of(*hand.sway(self.start, 0.0)[0], s["R_eb"])
+        start = self.start
+        if isinstance(start, HandThrow):
+            self._moving_air.start(len(log), (0.0, 0.0, -start.height_m))
+            rotation_of(*hand.sway(start, 0.0)[0], s["R_eb"])
             s["v_e_m_s"] = 0.0
         else:
-            self._start_in_flight(self.start)
+            self._moving_air.start(len(log), (start.north_m, start.east_m, -start.height_m))
+            self._start_in_flight(start)
 
     def _start_in_flight(self, start: InFlight) -> None:
-        """Trimmed, level relative to the moving air, heading as asked; servos and propeller as in the trim."""
+        """Trimmed relative to the moving air, heading as asked; servos and propeller as in the trim."""
         t = self.trimmed
-        euler_rad = (0.0, t.alpha_rad, start.heading_rad)
+        euler_rad = t.euler_rad(start.heading_rad)
         R_eb = np.empty((3, 3))
         rotation_of(*euler_rad, R_eb)
-        through_air_b = t.airspeed_m_s * np.array([math.cos(t.alpha_rad), 0.0, math.sin(t.alpha_rad)])
-        v_b = through_air_b + R_eb.T @ np.array(self.air.wind_e_m_s)
+        v_b = t.air_velocity_b_m_s + R_eb.T @ self._moving_air.wind_e_m_s
         self.begin((start.north_m, start.east_m, -start.height_m), euler_rad, v_b, command=t.command)
 
     def begin(
@@ -368,7 +223,8 @@ class JsbsimPlant:
         settle = max(1, round(settle_s / self.model.dt_s))
         self.model.place(-p_e_m[2], euler_rad, v_b_m_s, omega_b_rad_s, command, self.air, settle)
         self._anchor(p_e_m)
-        self.model.stir(self.air, self._turbulence_seed)
+        if self._air_moves:
+            self._blow(*self._moving_air.now)
 
     def _anchor(self, p_e_m: tuple[float, float, float]) -> None:
         """Let the place where JSBSim now is be `p_e_m`."""
@@ -377,6 +233,8 @@ class JsbsimPlant:
 
     def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
         """Fly tick `k` under `command` and fill truth row k; an Outcome where the flight ended in it."""
+        if self._air_moves:
+            self._blow(*self._moving_air.blow(self._truth, k))
         if k < self._hand_ticks:
             return self._in_hand(k, command)
         self._command(command)
@@ -384,6 +242,13 @@ class JsbsimPlant:
         for _ in range(self.steps):
             run()
         return self._observe(k)
+
+    def _blow(self, *air: float) -> None:
+        """Set the wind (3) and the rates of the air (3), which hold over the tick."""
+        for write, speed_m_s in zip(self._wind, air[:3], strict=True):
+            write(speed_m_s / FT_TO_M)
+        for write, rate_rad_s in zip(self._air_rates, air[3:], strict=False):  # none where the aeroplane has none
+            write(rate_rad_s)
 
     def _command(self, command: ActuatorCommand) -> None:
         self._aileron(command[0])
@@ -438,7 +303,7 @@ class JsbsimPlant:
         row["omega_b_rad_s"] = np.array(rates) + row["R_eb"].T @ self._state[0]["earth_rate_e"]
         row["p_e_m"] = (0.0, 0.0, -start.height_m)
         row["v_e_m_s"] = 0.0
-        row["wind_e_m_s"] = self.air.wind_e_m_s
+        row["wind_e_m_s"] = self._moving_air.wind_e_m_s
         row["phase"] = Phase.HELD
         complete(self._truth, k, self._state)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from autopilot.interface import NEUTRAL, Autopilot
 from autopilot.pilot import Script
-from estimator.interface import AttitudeEstimator, ImuSample
+from estimator.interface import AttitudeEstimator, HeadingReference, ImuSample
 from sim.acceptance import FlightCodeFailed, blaming, command_of, estimate_of, record_command
 from sim.events import events_of
 from sim.log import Flight, Log, Outcome
@@ -82,7 +82,7 @@ def fly(
         outcome, message = Outcome.INTERRUPTED, f"interrupted {k * plant.dt_s:.1f} s after power-up"
     flown = log.until(k)
     events = events_of(flown, outcome, message)
-    reference = getattr(estimator, "heading_reference", "course")
+    reference: HeadingReference = getattr(estimator, "heading_reference", "course")
     return Flight(flown, plant.dt_s, plant.release_s, outcome, reference, message, events, manifest or {})
 
 

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from estimator.interface import Array, HeadingReference
+from estimator.interface import Array, HeadingReference, Health
 from estimator.kernels import wrap
 from estimator.rotation import heading_rad, inclination_error_rad, rotation_error_rad, to_euler
 from sim.log import Log
 
 Colour = tuple[int, int, int]
+Range = tuple[float, float]
 TRUTH: Colour = (255, 150, 30)
 ESTIMATE: Colour = (60, 160, 255)
 SENSOR: Colour = (110, 200, 130)
@@ -111,6 +112,28 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
     for i, axis in enumerate("ne"):
         columns[f"flight/wind_{axis}"] = truth["wind_e_m_s"][:, i], flown["wind_e_m_s"][:, i]
     return {path: np.column_stack(lines) for path, lines in columns.items()}
+
+
+def limits(log: Log, lines: dict[str, Array]) -> dict[str, Range]:
+    """Range of every plot's vertical axis: all that `lines` hold, and two powers of ten at least to read it by.
+
+    An error counts from when the estimator knows its attitude: the start would hide the rest.
+    """
+    started = log.flown["health"] != Health.STARTING
+    found = {}
+    for path, values in lines.items():
+        shown = values[started] if path.endswith("error") and np.any(started) else values
+        shown = shown[np.isfinite(shown)]
+        if len(shown) == 0:
+            continue
+        low, high = float(shown.min()), float(shown.max())
+        margin = 0.06 * max(high - low, 1e-3)
+        low, high = low - margin, high + margin
+        step = 10.0 ** np.floor(np.log10(high - low))
+        if np.floor(high / step) - np.ceil(low / step) < 1.0:  # the viewer labels its multiples alone
+            low, high = (np.floor(low / step) - 0.05) * step, (np.ceil(high / step) + 0.05) * step
+        found[path] = float(low), float(high)
+    return found
 
 
 def _circle_deg(angle_rad: Array, cut_rad: float) -> Array:

@@ -8,7 +8,7 @@ The estimated aeroplane is drawn at the true position, so that what one sees bet
 alone.  The chase view follows the path, not the nose: its horizon stays level, and bank and pitch are seen.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,9 +21,10 @@ from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 from autopilot.interface import Mode
 from estimator.interface import Array, HeadingReference, Health
 from estimator.rotation import from_euler
+from sim.loft import Mesh
 from sim.log import Event, Flight, Log, Phase
-from sim.mesh import Mesh, aeroplane, geometry_of
-from sim.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, curves
+from sim.mesh import Part, aeroplane, geometry_of
+from sim.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, Range, curves, limits
 from sim.recording import digest, replacing
 from sim.story import setting, story
 from sim.viewer import Viewer as Viewer
@@ -33,16 +34,22 @@ if TYPE_CHECKING:
     import rerun as rr
     import rerun.blueprint as rrb
 
+    _When = Callable[[Any], list[rr.TimeColumn]]
+
 TIMELINE = "sim_time"
+CONTROLS = ("aileron", "elevator", "rudder")
 LAUNCH_LATITUDE_DEG, LAUNCH_LONGITUDE_DEG = 42.80, -73.95  # where the manifest names no other place
 
-_SKY: Colour = (30, 38, 50)
-_GROUND: Colour = (40, 50, 46)
-_GRID: Colour = (78, 94, 88)
+_SKY: Colour = (118, 146, 170)
+_GROUND: Colour = (66, 84, 66)
+_GRID: Colour = (92, 112, 90)
 _WIND: Colour = (120, 220, 230)
 _LARGE = 0.05  # the overview shows the aeroplane larger, by this times the reach in metres, or nobody would find it
 _WIDTHS = (2.4, 1.7, 1.2)  # of the lines of a plot: a lower one is seen beside those that cover it
-_TRACK_HZ = 25.0  # the drawn tracks
+_TRACK_HZ, _MAP_HZ = 25.0, 10.0  # the drawn tracks; the aeroplane on the map
+_STEP_RAD = np.radians(0.5)  # a control surface is drawn within this of where it is
+_GHOST, _THINNEST, _DENSER = 105, 10.0, 80.0  # opacity of 255: the estimate; the propeller at no throttle, more at full
+_PALE = 0.75
 _CHASE_S = 1.5  # the chase view follows the path smoothed over about so long
 _LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
 _LANE_COLOURS: dict[str, dict[str, Colour]] = {
@@ -63,9 +70,10 @@ def write(flight: Flight, path: str | Path) -> Path:
     with replacing(path) as temporary:
         temporary.touch()  # a refusal is ours to word, not Rerun's
         rec = _stream(flight.manifest, digest(flight)[:16])
-        rec.save(temporary, default_blueprint=_blueprint(flight.log, flight.release_s))
+        lines = curves(flight.log, flight.heading_reference) if len(flight.log) else {}
+        rec.save(temporary, default_blueprint=_blueprint(flight.log, flight.release_s, limits(flight.log, lines)))
         _send_fixed(rec, scene)
-        _send_rows(rec, scene, flight.log, 0)
+        _send_rows(rec, scene, flight.log, lines, 0)
         _send_end(rec, flight)
         rec.disconnect()
     return path
@@ -83,12 +91,13 @@ class LiveView:
         self._scene = Scene.of(manifest, release_s, heading_reference)
         self._sent = 0
         self._rec = _stream(manifest, None)
-        self._rec.connect_grpc(url, default_blueprint=_blueprint(None, 0.0))
+        self._rec.connect_grpc(url, default_blueprint=_blueprint(None, 0.0, {}))
         _send_fixed(self._rec, self._scene)
 
     def __call__(self, log: Log, n_rows: int) -> None:
         """Send the rows that are new."""
-        _send_rows(self._rec, self._scene, log.until(n_rows), self._sent)
+        so_far = log.until(n_rows)
+        _send_rows(self._rec, self._scene, so_far, curves(so_far, self._scene.heading_reference), self._sent)
         self._sent = n_rows
 
     def close(self, flight: Flight) -> None:
@@ -106,7 +115,7 @@ class Scene:
     parts : the aeroplane     place : latitude and longitude of the launch point, degrees
     """
 
-    parts: dict[str, Mesh]
+    parts: dict[str, Part]
     place: tuple[float, float]
     release_s: float
     heading_reference: HeadingReference
@@ -165,11 +174,12 @@ def _send_fixed(rec: "rr.RecordingStream", scene: Scene) -> None:
         words = list(colours)
         style = rr.StateConfiguration(values=words, labels=words, colors=list(colours.values()))
         rec.log(f"states/{lane}", style, static=True)
-    for name, mesh in scene.parts.items():
-        for body, colour, alpha in (("truth", TRUTH, 255), ("estimate", ESTIMATE, 110)):
-            shape = _painted(mesh, name, colour, alpha)
-            rec.log(f"world/{body}/body/{name}", shape, static=True)
-        rec.log(f"world/truth/body/large/{name}", _painted(mesh, name, TRUTH, 255), static=True)
+    for name, part in scene.parts.items():
+        shape = _painted(part.mesh, name, TRUTH)
+        rec.log(f"world/truth/body/{name}", shape, static=True)
+        rec.log(f"world/truth/body/large/{name}", shape, static=True)
+        if name != "propeller":
+            rec.log(f"world/estimate/body/{name}", _painted(part.mesh, name, ESTIMATE, _GHOST), static=True)
     for plot in PLOTS:
         lines = rr.SeriesLines(
             names=[c.name for c in plot.curves], colors=[c.colour for c in plot.curves],
@@ -178,25 +188,27 @@ def _send_fixed(rec: "rr.RecordingStream", scene: Scene) -> None:
         rec.log(f"plots/{plot.path}", lines, static=True)
 
 
-def _painted(mesh: Mesh, name: str, colour: Colour, alpha: int) -> "rr.Mesh3D":
-    """The mesh in its colour: dark below, so that one sees which side is up; fuselage pale, propeller thin air."""
+def _painted(mesh: Mesh, name: str, colour: Colour, alpha: int | None = None) -> "rr.Mesh3D":
+    """The mesh in its colours: pale fuselage and control surfaces, dark below, so that one sees which side is up."""
     import rerun as rr
 
     base = np.array(colour, np.float64)
     if name == "propeller":
-        base, alpha = np.array([220.0, 220.0, 220.0]), alpha // 4
-    elif name == "fuselage":
-        base = 0.35 * base + 0.65 * 235.0
+        base = np.array([225.0, 225.0, 225.0])
+    elif name in ("spinner", "canopy"):
+        base = 0.15 * base + 0.1 * np.array([210.0, 225.0, 255.0])
+    elif name == "fuselage" or name.startswith(CONTROLS):
+        base = _PALE * np.array([244.0, 240.0, 232.0]) + (1.0 - _PALE) * base
     below = np.clip(mesh.normals[:, 2:], 0.0, 1.0) if name != "propeller" else 0.0
-    rgb = np.broadcast_to(base * (1.0 - 0.65 * below), mesh.vertices.shape)
+    rgb = np.broadcast_to(base * (1.0 - 0.6 * below), mesh.vertices.shape)
     return rr.Mesh3D(
         vertex_positions=mesh.vertices, triangle_indices=mesh.triangles, vertex_normals=mesh.normals,
-        vertex_colors=rgb.astype(np.uint8), albedo_factor=(255, 255, 255, alpha),
+        vertex_colors=rgb.astype(np.uint8), albedo_factor=None if alpha is None else (255, 255, 255, alpha),
     )  # fmt: skip
 
 
-def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int) -> None:
-    """The rows of `log` from `start` on; the tracks anew as a whole."""
+def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, lines: Mapping[str, Array], start: int) -> None:
+    """The rows of `log` and of the `lines` of its plots from `start` on; the tracks anew as a whole."""
     import rerun as rr
 
     if start >= len(log):
@@ -216,22 +228,56 @@ def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int) ->
     for path, R_eb in poses.items():
         quaternion = Rotation.from_matrix(R_eb[new]).as_quat()
         rec.send_columns(path, when(new), rr.Transform3D.columns(translation=p_e_m[new], quaternion=quaternion))
-    for path, lines in curves(log, scene.heading_reference).items():
-        values = lines[new]
+    for path, drawn in lines.items():
+        values = drawn[new]
         columns = rr.Scalars.columns(scalars=values.ravel()).partition([values.shape[1]] * len(values))
         rec.send_columns(f"plots/{path}", when(new), columns)
     for lane, (table, column, meaning) in _LANES.items():
         states = getattr(log, table)[column]
-        changed = np.flatnonzero(np.diff(states, prepend=-1))
-        changed = changed[changed >= start]
+        changed = _changes(states, start)
         if len(changed):
             words = [meaning(states[k]).name.lower() for k in changed]
             rec.send_columns(f"states/{lane}", when(changed), rr.StateChange.columns(state=words))
+    _send_moving(rec, scene, log, start, when)
     here = scene.lat_lon_deg(p_e_m)
     size = rr.Radius.ui_points(7.0)
     rec.log("map/aeroplane", rr.GeoPoints.from_fields(colors=TRUTH, radii=size), static=True)
-    rec.send_columns("map/aeroplane", when(new), rr.GeoPoints.columns(positions=here[new]))
+    every = _every(log, _MAP_HZ)
+    seldom = np.arange(start + -start % every, len(log), every)
+    if len(seldom):
+        rec.send_columns("map/aeroplane", when(seldom), rr.GeoPoints.columns(positions=here[seldom]))
     _send_tracks(rec, scene, log, here)
+
+
+def _send_moving(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int, when: "_When") -> None:
+    """Where the control surfaces are, whenever one has moved by a step; the propeller as dense as the throttle."""
+    import rerun as rr
+
+    for name, part in scene.parts.items():
+        if part.hinge is not None:
+            deflection = log.truth[part.hinge.control]
+            moved = _changes(np.round(deflection * part.hinge.throw_rad / _STEP_RAD), start)
+            translation, quaternion = part.hinge.pose(deflection[moved])
+            columns = rr.Transform3D.columns(translation=translation, quaternion=quaternion)
+            rec.send_columns(f"world/truth/body/{name}", when(moved), columns)
+    if "propeller" in scene.parts:
+        level = np.round(16.0 * np.clip(log.truth["throttle"], 0.0, 1.0)) / 16.0
+        moved = _changes(level, start)
+        rgba = np.column_stack((np.full((len(moved), 3), 255.0), _THINNEST + _DENSER * level[moved]))
+        rec.send_columns(
+            "world/truth/body/propeller", when(moved), rr.Mesh3D.columns(albedo_factor=rgba.astype(np.uint8))
+        )
+
+
+def _changes(values: NDArray[Any], start: int) -> NDArray[np.intp]:
+    """Rows from `start` on whose value is not that of the row before; the very first among them."""
+    changed = np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
+    return changed[changed >= start]
+
+
+def _every(log: Log, rate_hz: float) -> int:
+    """How many rows lie between samples at about `rate_hz`."""
+    return max(1, round(1.0 / (rate_hz * max(float(log.measured["dt_s"][-1]), 1e-3))))
 
 
 def _ns(t_s: Array) -> NDArray[np.timedelta64]:
@@ -243,7 +289,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
     """The way so far: truth, its shadow on the ground, the GPS fixes; and the mean wind at the launch point."""
     import rerun as rr
 
-    every = max(1, round(1.0 / (_TRACK_HZ * max(float(log.measured["dt_s"][-1]), 1e-3))))
+    every = _every(log, _TRACK_HZ)
     track = log.truth["p_e_m"][::every]
     thin = rr.Radius.ui_points(1.0)
     rec.log("world/truth/track", rr.LineStrips3D([track], colors=TRUTH, radii=rr.Radius.ui_points(1.5)), static=True)
@@ -262,7 +308,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
     if speed_m_s > 0.1:
         from_deg = float(np.degrees(np.arctan2(-wind_e_m_s[1], -wind_e_m_s[0])) % 360.0)
         arrow = rr.Arrows3D(
-            vectors=[wind_e_m_s * 16.0], origins=[wind_e_m_s * -20.0], colors=_WIND, radii=1.0,
+            vectors=[wind_e_m_s * 16.0], origins=[wind_e_m_s * -20.0 - [0.0, 0.0, 25.0]], colors=_WIND, radii=1.0,
             labels=f"wind {speed_m_s:.1f} m/s from {from_deg:.0f}°",
         )  # fmt: skip
         rec.log("world/wind", arrow, static=True)
@@ -291,20 +337,23 @@ def _send_end(rec: "rr.RecordingStream", flight: Flight) -> None:
     rec.log("story", rr.TextDocument(story(flight), media_type=rr.MediaType.MARKDOWN), static=True)
 
 
-def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
-    """The layout: chase view, overview and map on the left; plots, story and events on the right.
+def _blueprint(log: Log | None, release_s: float, ranges: Mapping[str, Range]) -> "rrb.Blueprint":
+    """The layout: chase view, overview, story, events and map on the left; plots and states on the right.
 
-    log : what the overview shall hold; None for a flight that is still to come
+    log, ranges : what the overview and the axes of the plots shall hold; None and empty for a flight to come
     """
+    import rerun as rr
     import rerun.blueprint as rrb
 
     up = (0.0, 0.0, -1.0)
     sky = rrb.Background(color=_SKY)
+    faint = rr.LineStrips3D.from_fields(colors=(*TRUTH, 70), radii=rr.Radius.ui_points(0.8))
     chase = rrb.Spatial3DView(
         origin="/world/chase",
         contents=["+ /world/**", "- /world/truth/body/large/**", "- /world/launch", "- /world/gps", "- /world/wind"],
         name="Chase: orange truth, blue estimate", background=sky, line_grid=False,
-        eye_controls=rrb.EyeControls3D(position=(-2.0, -0.3, -0.95), look_target=(0.0, 0.0, 0.0), eye_up=up),
+        overrides={"world/truth/track": faint},
+        eye_controls=rrb.EyeControls3D(position=(-1.75, -0.3, -0.8), look_target=(0.0, 0.0, 0.0), eye_up=up),
     )  # fmt: skip
     centre, reach = _extent(log)
     overview = rrb.Spatial3DView(
@@ -315,22 +364,21 @@ def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
         ),
     )  # fmt: skip
     degrees_wide = 1.6 * reach / 111_320.0
-    on_map = rrb.MapView(origin="/map", name="Map", zoom=float(np.log2(360.0 / degrees_wide) + 0.3))
+    words = rrb.Tabs(
+        rrb.TextDocumentView(origin="/story", name="Story"),
+        rrb.TextLogView(origin="/events", name="Events"),
+        rrb.MapView(origin="/map", name="Map", zoom=float(np.log2(360.0 / degrees_wide) + 0.3)),
+        active_tab=0,
+    )
     span = _span(log, release_s)
     axis = rrb.TimeAxis(view_range=span) if span else None
-    pages = [rrb.Vertical(*_page(plots, axis), name=name) for name, plots in PAGES.items()]
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(chase, rrb.Horizontal(overview, on_map, column_shares=[3, 2]), row_shares=[3, 2]),
+            rrb.Vertical(chase, rrb.Horizontal(overview, words, column_shares=[5, 4]), row_shares=[3, 2]),
             rrb.Vertical(
-                rrb.Tabs(*pages, active_tab=0),
+                rrb.Tabs(*(_page(name, plots, axis, ranges) for name, plots in PAGES.items()), active_tab=0),
                 rrb.StateTimelineView(origin="/states", name="Phase, mode, estimator", time_view=axis),
-                rrb.Tabs(
-                    rrb.TextDocumentView(origin="/story", name="Story"),
-                    rrb.TextLogView(origin="/events", name="Events"),
-                    active_tab=0,
-                ),
-                row_shares=[6.6, 2.1, 3.3],
+                row_shares=[9, 2],
             ),
             column_shares=[9, 8],
         ),
@@ -343,15 +391,33 @@ def _blueprint(log: Log | None, release_s: float) -> "rrb.Blueprint":
     )
 
 
-def _page(plots: Sequence[Plot], axis: "rrb.TimeAxis | None") -> "Iterator[rrb.TimeSeriesView]":
+def _page(name: str, plots: Sequence[Plot], axis: "rrb.TimeAxis | None", ranges: Mapping[str, Range]) -> "rrb.Vertical":
     """The plots of a page below one another; a legend where it differs from the one above."""
     import rerun.blueprint as rrb
 
+    views, heights = [], []
     above: tuple[Curve, ...] = ()
     for plot in plots:
         legend = rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=plot.curves != above)
-        yield rrb.TimeSeriesView(origin=f"/plots/{plot.path}", name=plot.title, axis_x=axis, plot_legend=legend)
         above = plot.curves
+        shown = ranges.get(plot.path)
+        axis_y = rrb.ScalarAxis(range=shown) if shown else None
+        views.append(
+            rrb.TimeSeriesView(
+                origin=f"/plots/{plot.path}", name=plot.title, axis_x=axis, axis_y=axis_y, plot_legend=legend
+            )
+        )
+        heights.append(_height(shown))
+    return rrb.Vertical(*views, row_shares=heights, name=name)
+
+
+def _height(shown: Range | None) -> float:
+    """Height of a plot for its share of the page, in pixels: the viewer labels powers of ten 24 pixels apart."""
+    frame, least = 46.0, 70.0
+    if shown is None:
+        return frame + 2.0 * least
+    span = shown[1] - shown[0]
+    return frame + max(least, 24.0 * span / 10.0 ** np.floor(np.log10(span)))
 
 
 def _extent(log: Log | None) -> tuple[Array, float]:
@@ -364,10 +430,11 @@ def _extent(log: Log | None) -> tuple[Array, float]:
 
 
 def _span(log: Log | None, release_s: float) -> "rrb.TimeRange | None":
-    """The time that the plots show at first: all of it."""
+    """The time that the plots show at first: all of it, and some before."""
     import rerun.blueprint as rrb
 
     if log is None or len(log) == 0:
         return None
-    ends = (rrb.TimeRangeBoundary.absolute(seconds=float(t_s) - release_s) for t_s in log.truth["t_s"][[0, -1]])
-    return rrb.TimeRange(*ends)
+    first_s, last_s = (float(t_s) - release_s for t_s in log.truth["t_s"][[0, -1]])
+    first_s -= 0.16 * (last_s - first_s)  # room for the legends
+    return rrb.TimeRange(*(rrb.TimeRangeBoundary.absolute(seconds=t_s) for t_s in (first_s, last_s)))

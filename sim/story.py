@@ -37,7 +37,11 @@ def _air(manifest: Mapping[str, Any]) -> str:
     if not air:
         return ""
     wind = f"Wind {air['wind_m_s']:g} m/s from {air['wind_from_deg']:.0f}°" if air["wind_m_s"] else "No wind"
-    return wind + (f", turbulence W20 = {air['turbulence_w20_m_s']:g} m/s." if air["turbulence_w20_m_s"] else ".")
+    shear = f" at 10 m, shear {air['shear']:g}" if air["wind_m_s"] and air.get("shear") else ""
+    rest = [f"turbulence W20 = {air['turbulence_w20_m_s']:g} m/s"] if air["turbulence_w20_m_s"] else []
+    for one, things in (("gust", air.get("gusts") or ()), ("thermal", air.get("thermals") or ())):
+        rest += [f"{len(things)} {one}" + ("s" if len(things) > 1 else "")] if things else []
+    return ", ".join([wind + shear, *rest]) + "."
 
 
 def _figure(value: Any, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | bench | view``.
+"""The command line: ``wingslevel list | fly | check | bench | aircraft | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -17,8 +17,8 @@ from typing import Annotated, Any
 import typer
 
 from scenarios.harness import console
+from scenarios.harness.console import INTERRUPTED, USAGE
 
-USAGE, INTERRUPTED = 2, 130
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
 
 app = typer.Typer(
@@ -37,6 +37,27 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
 ]
+WindOption = Annotated[
+    str | None,
+    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm."),
+]
+ShearOption = Annotated[
+    str | None,
+    typer.Option("--shear", metavar="EXP", help="Growth of the wind with height: 0 none, 0.14 open country."),
+]
+GustOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; repeat it."
+    ),
+]
+TurbulenceOption = Annotated[
+    str | None,
+    typer.Option("--turbulence", metavar="W20", help="calm, light, moderate, severe, or the wind at 20 ft, m/s."),
+]
+ThermalsOption = Annotated[
+    str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
+]
 JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
@@ -51,13 +72,15 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     try:
-        return int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
+        code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
     except typer.TyperException as problem:
         console.error(problem.format_message())
         return USAGE
     except (typer.Abort, KeyboardInterrupt):
+        code = INTERRUPTED
+    if code == INTERRUPTED:
         console.error("interrupted")
-        return INTERRUPTED
+    return code
 
 
 @contextmanager
@@ -103,10 +126,11 @@ def fly(
     estimator: EstimatorOption = None,
     aircraft: Annotated[str | None, typer.Option(help="Name of an aircraft.")] = None,
     autopilot: Annotated[str | None, typer.Option(help="Registered name, module:Class or file.py:Class.")] = None,
-    wind: Annotated[
-        str | None, typer.Option(metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm.")
-    ] = None,
-    turbulence: Annotated[float | None, typer.Option(metavar="W20", help="Wind at 20 ft that scales it, m/s.")] = None,
+    wind: WindOption = None,
+    shear: ShearOption = None,
+    gust: GustOption = None,
+    turbulence: TurbulenceOption = None,
+    thermals: ThermalsOption = None,
     gps_rate: Annotated[float | None, typer.Option(metavar="HZ", help="Reports of the GPS.")] = None,
     imu_rate: Annotated[int | None, typer.Option(metavar="HZ", help="Gyro, accelerometer and the loop.")] = None,
     sensors: Annotated[str | None, typer.Option(help="Name of a sensor suite.")] = None,
@@ -126,8 +150,6 @@ def fly(
         "estimator": estimator,
         "aircraft": aircraft,
         "autopilot": autopilot,
-        "wind": wind,
-        "air.turbulence_w20_m_s": turbulence,
         "rates.gps_hz": gps_rate,
         "rates.imu_hz": imu_rate,
         "suite": sensors,
@@ -136,7 +158,7 @@ def fly(
     }
     with _reporting(json_) as report:
         with usage():
-            changes = _changes(set_) | {name: value for name, value in named.items() if value is not None}
+            changes = _changes(set_) | _given(named) | _air(wind, shear, gust, turbulence, thermals)
             flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web)
         single.tell(flown)
         report(flown.to_json())
@@ -150,6 +172,11 @@ def check(
     names: Annotated[list[str] | None, typer.Argument(help="Scenarios; all of them where none is named.")] = None,
     seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")] = "0-9",
     estimator: EstimatorOption = None,
+    wind: WindOption = None,
+    shear: ShearOption = None,
+    gust: GustOption = None,
+    turbulence: TurbulenceOption = None,
+    thermals: ThermalsOption = None,
     set_: SetOption = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
@@ -163,14 +190,15 @@ def check(
         with usage():
             for path in (junit, markdown):
                 _check_file(path)
-            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, _changes(set_))
+            changes = _changes(set_) | _air(wind, shear, gust, turbulence, thermals)
+            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
                 verdict, whole = gate.fly_all(tasks, workers or _processors(), advance)
         gate.tell(verdict)
         if not whole:
             report(verdict.to_json() | {"passed": False, "interrupted": True})
-            raise typer.Abort
+            return INTERRUPTED
         _write(junit, verdict.to_junit)
         _write(markdown, verdict.to_markdown)
         report(verdict.to_json())
@@ -199,6 +227,29 @@ def bench(
 
 
 @app.command()
+def aircraft(
+    name: Annotated[str, typer.Argument(help="Name of an aircraft.")],
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
+    json_: JsonOption = None,
+) -> None:
+    """The handbook page of an aeroplane: speeds, glide, climb, turns, stability and natural modes."""
+    from scenarios.harness import handbook
+
+    with _reporting(json_) as report:
+        with usage():
+            _check_file(picture)
+            handbook.check_picture(picture)
+            book = handbook.make(name)
+        handbook.tell(book)
+        if picture is not None:
+            from scenarios.harness import handbook_picture
+
+            with usage():
+                handbook_picture.draw(book, picture)
+        report(book.to_json())
+
+
+@app.command()
 def view(
     flight: Annotated[
         Path | None, typer.Argument(help="Folder of a recording, or a .rrd or .parquet file; by default the newest.")
@@ -222,6 +273,18 @@ def _changes(assignments: list[str] | None) -> dict[str, Any]:
             raise _refusal(f"--set {text!r}: write name=value, for instance gps.latency_s=0.5")
         changes[name.strip()] = value.strip()
     return changes
+
+
+def _given(named: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in named.items() if value is not None}
+
+
+def _air(
+    wind: str | None, shear: str | None, gust: list[str] | None, turbulence: str | None, thermals: str | None
+) -> dict[str, Any]:
+    """Overrides of the options about the air."""
+    named = {"wind": wind, "air.shear": shear, "air.gusts": gust or None}
+    return _given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
 
 
 def _processors() -> int:

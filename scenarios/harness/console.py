@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from scenarios.harness.checks import Row
 
+USAGE, INTERRUPTED = 2, 130  # exit codes, beside those of a verdict
 WIDTH = 80
 
 
@@ -91,6 +92,17 @@ def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Table"
     grid.add_column(unit, justify="right", no_wrap=True)
     for name, value in figures.items():
         grid.add_row(name, number(value))
+    return grid
+
+
+def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = (0,)) -> "Table":
+    """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty."""
+    grid = _table(title)
+    grid.show_header = any(headings)
+    for i, heading in enumerate(headings):
+        grid.add_column(heading, justify="left" if i in text else "right", no_wrap=True)
+    for row in rows:
+        grid.add_row(*row)
     return grid
 
 

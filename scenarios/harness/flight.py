@@ -6,11 +6,11 @@ from dataclasses import is_dataclass, replace
 from typing import Any
 
 from estimator.interface import AttitudeEstimator
+from scenarios.harness.air_config import build_air
 from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, override, resolve
 from scenarios.harness.fitted import changed, suite_params
 from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator
 from scenarios.harness.scenario import Scenario
-from sim.air import Air
 from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Flight, Log
 from sim.loop import Watch, fly
@@ -64,10 +64,15 @@ def fly_config(
     rates = config.rates.build()
     suite = Suite(suite_params(config.suite, config.sensors), rates, config.seed, config.flight)
     estimator = maker() if maker is not None else _estimator(config)
-    pilot = load_autopilot(config.autopilot, heading_reference_of(estimator))
+    pilot = load_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft)
     script = scenario.script(config)
     plant = JsbsimPlant(
-        config.aircraft, start=start_of(config), air=air_of(config), rates=rates, seed=config.seed, flight=config.flight
+        config.aircraft,
+        start=start_of(config),
+        air=build_air(config.air),
+        rates=rates,
+        seed=config.seed,
+        flight=config.flight,
     )
     flown = fly(
         plant,
@@ -105,16 +110,6 @@ def start_of(config: FlightConfig) -> Start:
         start.push_m_s2,
         start.push_s,
     )
-
-
-def air_of(config: FlightConfig) -> Air:
-    """The air of a resolved configuration; people type where the wind comes from, `Air` wants where it goes."""
-    from_deg = config.air.wind_from_deg
-    if isinstance(from_deg, str):
-        raise ValueError(f"air.wind_from_deg = {from_deg!r}: resolve the configuration first")
-    from_rad, m_s = math.radians(from_deg), config.air.wind_m_s
-    wind_e_m_s = (-m_s * math.cos(from_rad), -m_s * math.sin(from_rad), 0.0)
-    return Air(wind_e_m_s=wind_e_m_s, turbulence_w20_m_s=config.air.turbulence_w20_m_s)
 
 
 def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -138,6 +138,10 @@ def _fly_over_processes(tasks: Sequence[Task], workers: int, keep: Callable[[int
             while waiting:
                 for future in wait(waiting, return_when=FIRST_COMPLETED).done:
                     keep(waiting.pop(future), future.result())
+        except KeyboardInterrupt:
+            for worker in multiprocessing.active_children():  # what they are at is thrown away: it may take long
+                worker.terminate()
+            raise
         except BrokenProcessPool as error:
             raise WorkerDied(f"a worker process died with {len(waiting)} flights to go; try fewer --workers") from error
         finally:

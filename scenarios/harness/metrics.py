@@ -148,6 +148,17 @@ def height_m(flight: Flight) -> Series:
     return _series(flight, -flight.log.truth["p_e_m"][:, 2])
 
 
+def bank_size_deg(flight: Flight) -> Series:
+    """Size of the true bank angle, degrees."""
+    R = flight.log.truth["R_eb"]
+    return _series(flight, np.degrees(np.abs(np.arctan2(R[:, 2, 1], R[:, 2, 2]))))
+
+
+def angle_of_attack_deg(flight: Flight) -> Series:
+    """True angle of attack, degrees."""
+    return _series(flight, np.degrees(flight.log.truth["alpha_rad"]))
+
+
 def start(flight: Flight) -> float:  # noqa: ARG001 - a Moment like any other
     """The release."""
     return 0.0
@@ -250,6 +261,16 @@ def height_at_m(t_s: float) -> Metric:
 
     def metric(flight: Flight) -> Measured:
         values = height_m(flight).within(t_s - flight.dt_s, t_s).value
+        return Measured(float(values[-1])) if len(values) else NOTHING
+
+    return metric
+
+
+def launch_distance_at_m(t_s: float) -> Metric:
+    """Metric: true horizontal distance from the launch point `t_s` after the release."""
+
+    def metric(flight: Flight) -> Measured:
+        values = launch_distance_m(flight).within(t_s - flight.dt_s, t_s).value
         return Measured(float(values[-1])) if len(values) else NOTHING
 
     return metric

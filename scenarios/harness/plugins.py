@@ -8,7 +8,7 @@ A name is one of
 ``path/to/file.py:Class``  a file
 
 The class is called anew for each flight, without arguments (an autopilot's is given the ``heading_reference`` of the
-estimator where it asks for it).  Only ``update`` is required of it.
+estimator and the name of its ``aircraft`` where it asks for them).  Only ``update`` is required of it.
 """
 
 import difflib
@@ -16,24 +16,22 @@ import importlib
 import importlib.util
 import inspect
 import sys
+from collections import ChainMap
 from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import MappingProxyType, ModuleType
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from autopilot import AUTOPILOTS
+from estimator import ESTIMATORS
 
 if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
     from autopilot.interface import Autopilot
     from estimator.interface import AttitudeEstimator, HeadingReference
 
-ESTIMATORS: Mapping[str, str] = MappingProxyType(
-    {
-        "premerlani": "estimator.premerlani:Premerlani",
-        "gyro_only": "estimator.baselines:GyroOnly",
-        "oracle": "sim.oracle:Oracle",
-    }
-)
-AUTOPILOTS: Mapping[str, str] = MappingProxyType({"dcm": "autopilot.autopilot:DcmAutopilot"})
+# The oracle sees the truth: it is not flight code and not in flight code's own registry.
+_ALL_ESTIMATORS = ChainMap(ESTIMATORS, {"oracle": "sim.oracle:Oracle"})
 
 
 class _Kind(NamedTuple):
@@ -45,7 +43,7 @@ class _Kind(NamedTuple):
     arguments: tuple[str, ...]
 
 
-_ESTIMATOR = _Kind("estimator", ESTIMATORS, "wingslevel.estimators", ("measurements",))
+_ESTIMATOR = _Kind("estimator", _ALL_ESTIMATORS, "wingslevel.estimators", ("measurements",))
 _AUTOPILOT = _Kind("autopilot", AUTOPILOTS, "wingslevel.autopilots", ("estimate", "measurements", "setpoint"))
 
 
@@ -92,12 +90,15 @@ def heading_reference_of(estimator: object) -> "HeadingReference":
     return reference
 
 
-def load_autopilot(spec: str, heading_reference: "HeadingReference" = "course") -> "Autopilot":
+def load_autopilot(
+    spec: str, heading_reference: "HeadingReference" = "course", aircraft: str = "endurance"
+) -> "Autopilot":
     """A new autopilot by name, ``module:Class`` or ``file.py:Class``; PluginError as for `load_estimator`.
 
-    heading_reference : of the estimator that it will steer on, handed to a class that asks for it by this name
+    heading_reference : of the estimator that it will steer on      aircraft : name of what it will fly; both are
+    handed to a class that asks for them by these names
     """
-    return _load(_AUTOPILOT, spec, heading_reference=heading_reference)
+    return _load(_AUTOPILOT, spec, heading_reference=heading_reference, aircraft=aircraft)
 
 
 def _installed(kind: _Kind) -> dict[str, EntryPoint]:

@@ -21,5 +21,5 @@ def prepared(name: str, changes: Mapping[str, Any]) -> tuple[Scenario, FlightCon
     config = resolve(override(scenario.config, changes))
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
-    load_autopilot(config.autopilot, heading_reference_of(load_estimator(config.estimator)))
+    load_autopilot(config.autopilot, heading_reference_of(load_estimator(config.estimator)), config.aircraft)
     return scenario, config

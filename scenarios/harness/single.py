@@ -1,7 +1,7 @@
 """One flight, as the command line flies it: refused early or flown, recorded, judged and told."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,6 @@ from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Flight, Log, Outcome
-
-INTERRUPTED = 130
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +31,7 @@ class Flown:
     def exit_code(self) -> int:
         """As of the command line."""
         if self.flight.outcome == Outcome.INTERRUPTED:
-            return INTERRUPTED
+            return console.INTERRUPTED
         return self._verdict.exit_code
 
     @property
@@ -67,12 +65,14 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
                 live_view(log, n_rows)
 
         flight = fly_config(scenario, config, watch=watch)
+    judged = judge(scenario, flight)
+    flight = replace(flight, manifest={**flight.manifest, "verdict": recording.plain(judged.rows)})  # for its story
     if live_view is not None:
         live_view.close(flight)
     folder = recording.save(flight, _free_folder(into, scenario.name, config))
     if rerun:
         viewing.write_rerun(flight, folder)
-    return Flown(scenario, flight, judge(scenario, flight), folder, live_view)
+    return Flown(scenario, flight, judged, folder, live_view)
 
 
 def tell(flown: Flown) -> None:

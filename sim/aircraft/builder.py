@@ -225,6 +225,8 @@ def _aerodynamics(d: Design) -> str:
             product(
                 "aero/force/side-beta", *force, side, "aero/cos-beta", a.cy_beta, about="the same, across the wind"
             ),
+            product("aero/force/side-p", *force, b2v, p, a.cy_p),
+            product("aero/force/side-r", *force, b2v, r, a.cy_r, about="the fin's, balances the rudder's in a turn"),
             product("aero/force/side-rudder", fin_q, area, cos_a, "servo/rudder", a.cy_rudder * rudder),
         ),
         axis(

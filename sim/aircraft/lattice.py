@@ -65,6 +65,8 @@ class Attached:
     roll_beta: float
     yaw_beta: float
     fin_yaw_beta: float  # the fin's part of yaw_beta
+    cy_p: float
+    cy_r: float
     roll_p: float
     yaw_p: float
     roll_r: float
@@ -245,6 +247,7 @@ class Lattice:
             cy_beta=beta[2] - 2.0 * BODY_SIDE * s.fuselage_height_m * s.fuselage_width_m / s.wing_area_m2,
             roll_beta=beta[3] + self._wing_height(), yaw_beta=beta[5] - body / s.span_m,
             fin_yaw_beta=fin_beta[5],
+            cy_p=p[2], cy_r=r[2],
             roll_p=p[3], yaw_p=p[5], roll_r=r[3], yaw_r=r[5], fin_yaw_r=fin_r[5],
             cy_rudder=rudder * fin[2], roll_rudder=rudder * fin[3], yaw_rudder=rudder * fin[5],
             roll_aileron=flap * aileron[3], yaw_aileron=flap * aileron[5],

@@ -17,7 +17,7 @@ from scenarios.harness.flight import fly_scenario
 from sim import recording, rerun_view, viewer
 from sim.log import Event, Flight, Log, Outcome
 from sim.mesh import aeroplane, geometry_of
-from sim.plots import curves
+from sim.plots import curves, limits
 from sim.recording import RecordingError
 from sim.story import story
 
@@ -188,11 +188,65 @@ def test_map_shows_the_fixes_where_the_ellipsoid_has_them(shown, flight):
 
 
 def test_both_aeroplanes_are_the_mesh_of_their_geometry(shown):
-    """Truth and estimate carry the same shape, part by part."""
-    for name, mesh in aeroplane(geometry_of("endurance")).items():
-        for body in ("truth", "estimate"):
+    """Truth and estimate carry the same shape, part by part; the estimate knows nothing of a propeller."""
+    for name, part in aeroplane(geometry_of("endurance")).items():
+        for body in ("truth", "estimate") if name != "propeller" else ("truth",):
             _, drawn = shown.column(f"/world/{body}/body/{name}", "Mesh3D:vertex_positions", static=True)
-            np.testing.assert_allclose(np.array(drawn[0]), mesh.vertices, rtol=0, atol=FLOAT32)
+            np.testing.assert_allclose(np.array(drawn[0]), part.mesh.vertices, rtol=0, atol=FLOAT32)
+
+
+def latest(t_s, values, at_s):
+    """What the viewer shows at the times `at_s`: of each the value before, or then."""
+    return np.array(values)[np.searchsorted(t_s, at_s + 1e-9, side="right") - 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "axis"),
+    [
+        ("aileron_right", "aileron", (0, -1, 0)), ("aileron_left", "aileron", (0, 1, 0)),
+        ("elevator_right", "elevator", (0, -1, 0)), ("elevator_left", "elevator", (0, -1, 0)),
+        ("rudder", "rudder", (0, 0, -1)),
+    ],
+)  # fmt: skip
+def test_control_surface_is_shown_within_half_a_degree_of_the_truth(shown, flight, name, column, axis):
+    """At every tick, by what the viewer shows then, with the throw of the geometry; and the hinge stays in place."""
+    entity = f"/world/truth/body/{name}"
+    t_s, quaternion = shown.column(entity, "Transform3D:quaternion")
+    _, translation_m = shown.column(entity, "Transform3D:translation")
+    at_s = flight.log.truth["t_s"] - flight.release_s
+    turned = Rotation.from_quat(latest(t_s, quaternion, at_s)[:, 0])
+    drawn_deg = np.degrees(turned.magnitude() * np.sign(turned.as_rotvec() @ np.array(axis)))
+    true_deg = geometry_of("endurance").get(f"{column}_throw_deg", 25.0) * flight.log.truth[column]
+    assert np.ptp(true_deg) > 2.0
+    np.testing.assert_allclose(drawn_deg, true_deg, rtol=0, atol=0.5 + 1e-4)
+    hinge_m = aeroplane(geometry_of("endurance"))[name].hinge.point_m
+    stays_m = turned.apply(hinge_m) + latest(t_s, translation_m, at_s)[:, 0]
+    np.testing.assert_allclose(stays_m, np.broadcast_to(hinge_m, stays_m.shape), rtol=0, atol=FLOAT32)
+
+
+def test_propeller_is_drawn_denser_with_more_throttle(shown, flight):
+    """Its opacity follows the throttle to a sixteenth, and is never nothing."""
+    t_s, colour = shown.column("/world/truth/body/propeller", "Mesh3D:albedo_factor")
+    throttle = flight.log.truth["throttle"]
+    opacity = latest(t_s, colour, flight.log.truth["t_s"] - flight.release_s)[:, 0] % 256  # 0xRRGGBBAA
+    assert np.ptp(throttle) > 0.5
+    np.testing.assert_allclose(opacity, 10.0 + 80.0 * throttle, rtol=0, atol=80.0 / 32.0 + 1.0)
+
+
+def test_ranges_of_the_plots_hold_their_lines_and_two_marks_to_read(flight):
+    """Every line but the error of the start is inside; two multiples of a power of ten are too, or degrees are lost."""
+    lines = curves(flight.log, flight.heading_reference)
+    found = limits(flight.log, lines)
+    known = flight.log.flown["health"] > 0
+    assert 0 < known.sum() < len(known)
+    for path, (low, high) in found.items():
+        values = lines[path][known] if path == "attitude/error" else lines[path]
+        assert low < np.nanmin(values) <= np.nanmax(values) < high
+        step = 10.0 ** np.floor(np.log10(high - low))
+        assert np.sum((np.arange(-1000, 1001) * step >= low) & (np.arange(-1000, 1001) * step <= high)) >= 2
+    lost = lines["attitude/error"].copy()
+    lost[~known] = 170.0
+    assert limits(flight.log, {"attitude/error": lost})["attitude/error"] == found["attitude/error"]
 
 
 def test_story_names_the_flight_and_every_line_of_its_verdict(flight):

@@ -86,9 +86,7 @@ def test_update_any_rotation_and_measurement_gives_a_command_within_limits(name)
         wind = None if wind is None else np.array(wind)
         R_eb = Rotation.from_quat(quaternion).as_matrix()
         accept(
-            autopilot.update(
-                AttitudeEstimate(R_eb, np.array(omega), wind_e_m_s=wind), Measurements(rows, 0), setpoint
-            )
+            autopilot.update(AttitudeEstimate(R_eb, np.array(omega), wind_e_m_s=wind), Measurements(rows, 0), setpoint)
         )
 
     commands_are_finite()

@@ -96,6 +96,7 @@ def test_wheel_installed_lists_and_flies(installed: Path, tmp_path: Path) -> Non
     assert set(json.loads(listed.stdout)["scenarios"]) == scenarios
     flown = call([command, "fly", "hand_launch", "--duration", "5", "--json", "-"], tmp_path)
     assert flown.returncode in (0, 1), flown.stderr
+    assert flown.stdout, flown.stderr
     data = json.loads(flown.stdout)
     assert data["flights"][0]["outcome"] == "completed"
     assert {"flight.parquet", "manifest.json", "flight.rrd"} == {

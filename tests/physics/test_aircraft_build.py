@@ -18,7 +18,7 @@ from sim.aircraft.lattice import Attached, flap_effectiveness
 from sim.aircraft.masses import Box, Spread, balance
 from sim.aircraft.shape import Shape
 from sim.aircraft.stall import Polars, plate_normal
-from sim.jsbsim_plant import AIRCRAFT
+from sim.jsbsim_model import AIRCRAFT
 
 NAMES = ("endurance", "gentle_lady")
 NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?|-?\d+")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sim.aircraft.shape import Shape
-from sim.jsbsim_plant import AIRCRAFT
+from sim.jsbsim_model import AIRCRAFT
 
 NAMES = ("endurance", "gentle_lady")
 
@@ -140,14 +140,14 @@ def test_lateral_stiffness_is_that_of_the_class(model):
 BROKEN = """
 import shutil, sys
 from pathlib import Path
-from sim import jsbsim_plant
+from sim import jsbsim_model
 copy = Path(sys.argv[1])
-shutil.copytree(jsbsim_plant.AIRCRAFT / "endurance", copy / "endurance")
+shutil.copytree(jsbsim_model.AIRCRAFT / "endurance", copy / "endurance")
 model = copy / "endurance" / "endurance.xml"
 model.write_text(model.read_text().replace('<engine file="motor">', '<engine file="none">'))
-jsbsim_plant.AIRCRAFT = copy
+jsbsim_model.AIRCRAFT = copy
 try:
-    jsbsim_plant.Model("endurance", 200)
+    jsbsim_model.Model("endurance", 200)
 except RuntimeError as error:
     Path(sys.argv[1], "said").write_text(str(error))
 """

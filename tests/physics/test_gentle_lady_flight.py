@@ -5,6 +5,7 @@ glide is found here by root finding of its own.
 """
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from autopilot.interface import ActuatorCommand
 from sim.air import STILL
-from sim.jsbsim_plant import FT_TO_M, LATITUDE_DEG, Model
+from sim.jsbsim_model import FT_TO_M, LATITUDE_DEG, Model
 from sim.truth import gravity_m_s2
 
 HEIGHT_M = 60.0
@@ -151,8 +152,10 @@ def test_coordinated_turn_by_rudder_meets_the_closed_form(model, cruise):
     rows = fly(model, 40.0, pilot, roll=math.radians(25.0))
     last = {name: column[-4000:].mean() for name, column in rows.items()}
     assert abs(math.degrees(last["roll"]) - 25.0) < 5.0
-    # Side force of the slip on fin, body and dihedral: C_Y beta q S, the only force across the wings.
-    side = -0.327 * last["beta"] * 0.5 * 1.19 * last["v"] ** 2 * 0.428 / 0.71
+    # Side force of slip and yaw rate on fin, body and dihedral, C_Y q S: all that acts across the wings.
+    half_span_in_s = 1.99 / (2.0 * last["v"])
+    c_y = -0.327 * last["beta"] + 0.253 * last["r"] * half_span_in_s - 0.293 * last["p"] * half_span_in_s
+    side = c_y * 0.5 * 1.19 * last["v"] ** 2 * 0.428 / 0.71
     flat = last["v"] * math.cos(math.asin(last["down_v"] / last["v"]))
     bank = math.atan(last["psi_dot"] * flat / G_M_S2) - side / (G_M_S2 * math.cos(last["roll"]))
     assert math.tan(bank) == pytest.approx(math.tan(last["roll"]), rel=0.04)
@@ -174,8 +177,8 @@ def test_stalled_turn_departs_and_a_normal_one_does_not(model, cruise):
     normal, stalled = turn(model, cruise, 0.3), turn(model, cruise, 1.0)
     assert np.degrees(normal["alpha"]).max() < 10.0  # measured 3
     assert np.degrees(normal["roll"]).max() < 45.0  # measured 33
-    assert np.degrees(stalled["alpha"]).max() > 13.0  # measured 15
-    assert np.degrees(stalled["roll"]).max() > 70.0  # measured 82
+    assert np.degrees(stalled["alpha"]).max() > 11.0  # past the stall at 10; measured 12.5
+    assert np.degrees(stalled["roll"]).max() > 70.0  # measured 77
     assert np.abs(stalled["p"]).max() > 4.0 * np.abs(normal["p"]).max()  # measured 1.8 and 0.14 rad/s
 
 
@@ -272,7 +275,9 @@ wild_rate = st.floats(-6.0, 6.0)
 )
 def test_wild_state_any_attitude_and_motion_stays_finite(model, quaternion, v_b, omega, command):
     """Tail slides, inverted, backwards, sideways, stalled, spun: five seconds later it is still a flight."""
-    yaw, pitch, roll = Rotation.from_quat(quaternion).as_euler("ZYX")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # straight up and down are among the attitudes
+        yaw, pitch, roll = Rotation.from_quat(quaternion).as_euler("ZYX")
     model.place(300.0, (roll, pitch, yaw), np.array(v_b), omega, command, STILL, 1)
     get = [model.getter(name) for name in READ.values()]
     seen = np.empty((1000, len(get)))

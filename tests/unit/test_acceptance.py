@@ -71,3 +71,11 @@ def test_estimate_of_an_estimator_that_raises_names_class_time_and_fault(flown):
 def test_record_command_that_is_not_finite_is_refused(flown):
     with pytest.raises(Unusable, match="not finite"):
         record_command(flown, 0, ActuatorCommand(0.0, math.nan, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("answer", [None, np.eye(3), (np.eye(3), np.zeros(3))])
+def test_record_of_something_that_is_no_answer_says_what_is_wanted(flown, answer):
+    with pytest.raises(Unusable, match=r"update\(\) returned \w+, must return an AttitudeEstimate"):
+        record_estimate(flown, 0, answer)
+    with pytest.raises(Unusable, match=r"update\(\) returned \w+, must return an ActuatorCommand"):
+        record_command(flown, 0, answer)

@@ -63,9 +63,7 @@ def wrapped(rad):
 @given(flown=course, wanted=course, pitch=st.floats(-1.5, 1.5), roll=angle)
 def test_heading_error_any_attitude_equals_the_wrapped_course_difference(flown, wanted, pitch, roll):
     """Cross and dot product of the nose vector give the sine and cosine of the difference, also inverted."""
-    north, east = direction_of_travel(
-        nose(flown, pitch, roll), UNKNOWN, row_of(valid=0), state(), 0, record()
-    )
+    north, east = direction_of_travel(nose(flown, pitch, roll), UNKNOWN, row_of(valid=0), state(), 0, record())
     sine, cosine = heading_error(north, east, math.cos(wanted), math.sin(wanted))
     np.testing.assert_allclose(wrapped(math.atan2(sine, cosine) - (wanted - flown)), 0.0, rtol=0, atol=1e-9)
 

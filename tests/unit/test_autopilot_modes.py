@@ -2,12 +2,15 @@
 
 import math
 from dataclasses import astuple
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from autopilot.autopilot import _PARAMS, AutopilotParams, DcmAutopilot
+import sim.aircraft
+from autopilot.airframes import AutopilotParams, params_of
+from autopilot.autopilot import _PARAMS, DcmAutopilot
 from autopilot.guidance import GuidanceParams
 from autopilot.interface import Mode, Setpoint
 from autopilot.mixer import MixerParams, mix
@@ -73,9 +76,7 @@ def test_course_nose_estimator_crabs_into_the_wind():
     north = Setpoint(Mode.COURSE, course_rad=0.0)
     windy = estimate(wind=np.array([0.0, 5.0, 0.0]))
     assert DcmAutopilot(heading_reference="nose").update(windy, measurements(), north).bank_demand_rad < -0.1
-    assert (
-        DcmAutopilot(heading_reference="course").update(windy, measurements(), north).bank_demand_rad == 0.0
-    )
+    assert DcmAutopilot(heading_reference="course").update(windy, measurements(), north).bank_demand_rad == 0.0
 
 
 def test_return_heading_away_turns_back_at_the_limit_and_heading_home_flies_straight():
@@ -114,9 +115,7 @@ def test_mode_change_out_of_rate_forgets_the_integral_of_the_manoeuvre():
     pull = Setpoint(Mode.RATE, rate_b_rad_s=(0.0, 0.3, 0.0))
     for _ in range(100):
         autopilot.update(LEVEL, measurements(), pull)
-    assert autopilot.update(LEVEL, measurements(), level) == DcmAutopilot().update(
-        LEVEL, measurements(), level
-    )
+    assert autopilot.update(LEVEL, measurements(), level) == DcmAutopilot().update(LEVEL, measurements(), level)
 
 
 def test_setpoint_throttle_overrides_the_autopilot_where_given():
@@ -132,9 +131,50 @@ def test_heading_reference_unknown_is_refused():
         DcmAutopilot(heading_reference="track")
 
 
+@pytest.mark.parametrize("mode", [Mode.COURSE, Mode.RETURN, Mode.LAUNCH])
+@pytest.mark.parametrize("height_m", [-100.0, 50.0, 1000.0])
+def test_sailplane_any_height_wanted_glides_and_never_pulls(mode, height_m):
+    """Without a motor no height is worth a slower flight: the pitch is that of the glide, the motor is off."""
+    sailplane = DcmAutopilot(aircraft="gentle_lady")
+    wanted = Setpoint(mode, course_rad=2.0, height_m=height_m, throttle=1.0)
+    glide_rad = params_of("gentle_lady").guidance.pitch_trim_rad
+    for sink_m_s in (-3.0, 0.5, 3.0):
+        m = measurements(north_m=300.0, force_x=27.0)
+        m.rows["gps_v_e_m_s"][0, 2] = sink_m_s
+        for _ in range(200):
+            command = sailplane.update(LEVEL, m, wanted)
+        assert command.pitch_demand_rad == glide_rad
+        assert command.throttle == 0.0
+    assert glide_rad < 0.0
+
+
+def test_sailplane_turns_by_rudder_within_its_own_bank_limit():
+    """The set-point allows 60 degrees, the aeroplane not; right is right rudder, and there is no aileron."""
+    sailplane = DcmAutopilot(aircraft="gentle_lady")
+    east = Setpoint(Mode.COURSE, course_rad=0.6 * math.pi, bank_limit_rad=math.radians(60.0))
+    command = sailplane.update(LEVEL, measurements(), east)
+    assert 0.0 < command.bank_demand_rad <= params_of("gentle_lady").guidance.bank_limit_rad
+    assert command.rudder > 0.1
+    assert command.aileron == 0.0
+    gentler = Setpoint(Mode.COURSE, course_rad=0.6 * math.pi, bank_limit_rad=0.1)
+    assert sailplane.update(LEVEL, measurements(), gentler).bank_demand_rad == 0.1
+
+
+def test_params_of_an_aircraft_that_nobody_has_tuned_for_is_refused():
+    """One line that says which there are."""
+    with pytest.raises(ValueError, match=r"aircraft 'kite': .* only for endurance, gentle_lady$"):
+        DcmAutopilot(aircraft="kite")
+
+
+def test_params_there_are_gains_for_every_aircraft():
+    """Whatever `sim` can fly, the autopilot can steer."""
+    for airframe in Path(sim.aircraft.__file__).parent.glob("*/airframe.toml"):
+        assert isinstance(params_of(airframe.parent.name), AutopilotParams)
+
+
 def test_params_reach_the_kernel():
     """Every group of parameters is packed where the kernel reads it."""
-    params = AutopilotParams(StabiliseParams(aileron_per_roll_rate_s=0.0, aileron_per_rate_error_s=0.0))
+    params = AutopilotParams(StabiliseParams(roll_control_per_rate_s=0.0, roll_control_per_rate_error_s=0.0))
     banked = estimate(roll=0.5)
     setpoint = Setpoint(Mode.STABILISE)
     assert DcmAutopilot(params).update(banked, measurements(), setpoint).aileron == 0.0
@@ -142,13 +182,25 @@ def test_params_reach_the_kernel():
     assert DcmAutopilot(trimmed).update(LEVEL, measurements(), setpoint).aileron == 0.125
 
 
-@pytest.mark.parametrize("limit", [1.0, 0.5])
-def test_mix_beyond_the_limits_is_held(limit):
-    """Surfaces stay within their share of the travel, the throttle within 0..1."""
+def mixed(control, **params):
     p = np.zeros(1, _PARAMS["mixer"])
-    p[0] = astuple(MixerParams(surface_limit=limit))
-    assert mix(9.0, -9.0, 9.0, 9.0, p[0]) == (limit, -limit, limit, 1.0)
-    assert mix(-9.0, 9.0, -9.0, -9.0, p[0]) == (-limit, limit, -limit, 0.0)
+    p[0] = astuple(MixerParams(**params))
+    return mix(*control, p[0])
+
+
+@pytest.mark.parametrize("limits", [(1.0, 1.0, 1.0, 1.0), (0.5, 0.6, 0.7, 0.8), (0.0, 1.0, 1.0, 0.0)])
+def test_mix_beyond_the_limits_is_held(limits):
+    """Each surface stays within its share of the travel, the throttle between 0 and its own; 0 is not fitted."""
+    names = ("aileron_limit", "elevator_limit", "rudder_limit", "throttle_limit")
+    params = dict(zip(names, limits, strict=True))
+    aileron, elevator, rudder, throttle = limits
+    assert mixed((9.0, -9.0, 9.0, 9.0), **params) == (aileron, -elevator, rudder, throttle)
+    assert mixed((-9.0, 9.0, -9.0, -9.0), **params) == (-aileron, elevator, -rudder, 0.0)
+
+
+def test_mix_without_ailerons_roll_control_is_rudder_to_the_same_side():
+    """Nose right slips to the left, and the dihedral rolls out of the slip, to the right."""
+    assert mixed((0.4, 0.0, 0.1, 0.0), aileron_limit=0.0, rudder_per_roll=1.0) == (0.0, 0.0, 0.5, 0.0)
 
 
 @pytest.mark.parametrize(

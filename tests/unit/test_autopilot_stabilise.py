@@ -136,7 +136,7 @@ def test_rate_control_coordinated_turn_does_not_leak_into_the_pitch_damping(bank
     R = attitude(bank, 0.0)
     omega = R.T @ [0.0, 0.0, G_M_S2 * math.tan(bank) / PARAMS.airspeed_m_s]
     undamped = StabiliseParams(
-        elevator_per_rate_error_s=0.0, aileron_per_rate_error_s=0.0, rudder_per_rate_error_s=0.0
+        elevator_per_rate_error_s=0.0, roll_control_per_rate_error_s=0.0, rudder_per_rate_error_s=0.0
     )
     demand = rate_demand(R, omega, bank, 0.0, record())
     damped = rate_control(demand, R, omega, state(), record(), 0.02)

@@ -8,14 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from scenarios.harness.air_config import Wind, parse_wind
 from scenarios.harness.config import (
     AirConfig,
     FlightConfig,
     HandThrowStart,
     InFlightStart,
-    Wind,
     override,
-    parse_wind,
     resolve,
 )
 from scenarios.harness.fitted import changed, suite_params

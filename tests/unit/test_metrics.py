@@ -18,8 +18,10 @@ from scenarios.harness.metrics import (
     NOTHING,
     Measured,
     after,
+    angle_of_attack_deg,
     at,
     attitude_error_deg,
+    bank_size_deg,
     end,
     gyro_bias_error_deg_s,
     heading_error_deg,
@@ -27,6 +29,7 @@ from scenarios.harness.metrics import (
     height_m,
     highest,
     inclination_error_deg,
+    launch_distance_at_m,
     lowest,
     nearest_m,
     orthogonality_error,
@@ -219,6 +222,25 @@ def test_heights_of_a_climb_are_read_where_asked():
     assert over(height_m, lowest)(flight).value == pytest.approx(1.2, rel=0, abs=1e-12)
     assert height_at_m(20.0)(flight).value == pytest.approx(40.0, rel=0, abs=1e-6)
     assert height_at_m(21.0)(flight) == NOTHING
+
+
+def test_launch_distance_at_a_time_is_horizontal():
+    """30 m north and 40 m east after 10 s, however high."""
+    flight = made_up(20.0)
+    t_s = since_release_s(flight)
+    flight.log.truth["p_e_m"] = np.outer(t_s, (3.0, 4.0, -9.0))
+    assert launch_distance_at_m(10.0)(flight).value == pytest.approx(50.0, rel=0, abs=1e-6)
+    assert launch_distance_at_m(21.0)(flight) == NOTHING
+
+
+@pytest.mark.parametrize("roll_deg", [-170.0, -30.0, 30.0, 100.0])
+def test_bank_is_the_size_of_the_roll_whatever_pitch_and_heading(roll_deg):
+    """And the angle of attack is the plant's, in degrees."""
+    flight = made_up(1.0)
+    flight.log.truth["R_eb"] = Rotation.from_euler("ZYX", [200.0, -20.0, roll_deg], degrees=True).as_matrix()
+    flight.log.truth["alpha_rad"] = math.radians(7.0)
+    np.testing.assert_allclose(bank_size_deg(flight).value, abs(roll_deg), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(angle_of_attack_deg(flight).value, 7.0, rtol=0, atol=1e-12)
 
 
 def test_pass_over_the_launch_point_is_timed_and_measured():

@@ -136,6 +136,22 @@ def test_load_autopilot_that_asks_is_told_the_heading_reference(file_of) -> None
     assert plugins.load_autopilot(f"{path}:Pilot", "nose").reference == "nose"
 
 
+def test_load_autopilot_that_asks_is_told_the_aircraft(file_of) -> None:
+    """An autopilot that flies more than one aeroplane must know which."""
+    path = file_of(
+        "class Pilot:\n"
+        "    def __init__(self, aircraft): self.aircraft = aircraft\n"
+        "    def update(self, estimate, m, setpoint): ...\n"
+    )
+    assert plugins.load_autopilot(f"{path}:Pilot", aircraft="gentle_lady").aircraft == "gentle_lady"
+
+
+def test_load_autopilot_for_an_aircraft_that_it_has_no_gains_for_is_refused() -> None:
+    """One line with those that it has."""
+    with pytest.raises(plugins.PluginError, match=r"'glider': the autopilot has no gains .* endurance, gentle_lady$"):
+        plugins.load_autopilot("dcm", aircraft="glider")
+
+
 def test_load_autopilot_with_the_update_of_an_estimator_is_refused(file_of) -> None:
     """An estimator named in the place of an autopilot is noticed."""
     with pytest.raises(plugins.PluginError, match=r"must be update\(estimate, measurements, setpoint\)"):

@@ -1,0 +1,31 @@
+"""Picture of a Rerun recording, without a screen: python docs/images/picture.py FLIGHT.rrd SECONDS PICTURE.jpg
+
+Needs a Vulkan driver; a processor will do (Debian: mesa-vulkan-drivers).
+"""
+
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PIL import Image
+from rerun.experimental import ViewerClient
+
+from sim.viewer import executable, free_port
+
+recording, seconds, picture = Path(sys.argv[1]).resolve(), float(sys.argv[2]), Path(sys.argv[3])
+with (
+    TemporaryDirectory() as folder,
+    ViewerClient.spawn(
+        headless=True, port=free_port(), hide_welcome_screen=True, executable_path=str(executable())
+    ) as viewer,
+):
+    viewer.open(str(recording))
+    time.sleep(3.0)  # it loads and compiles
+    viewer.set_time("sim_time", duration=seconds, play_state="paused")
+    time.sleep(2.0)  # it settles: then the same picture comes again, byte by byte
+    viewer.save_screenshot(f"{folder}/screen.png")
+    image = Image.open(f"{folder}/screen.png").convert("RGB")
+image = image.crop((0, 36, *image.size))  # without the empty bar on top
+image = image.resize((1600, round(1600 * image.height / image.width)), Image.Resampling.LANCZOS)
+image.save(picture, quality=86, subsampling=0, optimize=True)

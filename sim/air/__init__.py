@@ -1,0 +1,14 @@
+"""The air that the aeroplane flies through: wind that grows with height, gusts, turbulence and thermals.
+
+``profile``  the mean wind with height        ``gust``     discrete 1-cosine gusts
+``dryden``   turbulence                       ``thermal``  updrafts and the sink between them
+``air``      all of it added up, once a tick
+
+Heights are above the ground, which is flat and at the height of the launch point.
+"""
+
+from sim.air.air import STILL, Air, MovingAir
+from sim.air.gust import Gust
+from sim.air.thermal import Thermals
+
+__all__ = ["STILL", "Air", "Gust", "MovingAir", "Thermals"]

@@ -1,0 +1,81 @@
+"""The command `wingslevel aircraft`: page, JSON, picture, refusals."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from scenarios.harness.cli import run
+
+NUMBERS = (
+    "glide_ratio", "min_sink_m_s", "stall_speed_m_s", "best_glide_speed_m_s", "top_speed_m_s", "climb_m_s",
+    "static_margin", "roll_rate_deg_s",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory) -> dict:
+    path = tmp_path_factory.mktemp("page") / "endurance.json"
+    assert run(["aircraft", "endurance", "--json", str(path)]) == 0
+    return json.loads(path.read_text())
+
+
+def test_json_names_every_number_of_the_page(page):
+    assert all(isinstance(page[name], float) and page[name] > 0.0 for name in NUMBERS)
+    assert set(page["modes"]) == {"short_period", "phugoid", "roll", "dutch_roll", "spiral"}
+    for mode in page["modes"].values():
+        assert mode["omega_rad_s"] > 0.0
+        assert -1.0 <= mode["damping"] <= 1.0
+        assert mode["textbook"]["omega_rad_s"] > 0.0
+    assert page["modes"]["spiral"]["period_s"] is None
+
+
+def test_numbers_of_the_endurance_are_of_its_class(page):
+    """Stall 6 to 8 m/s and climb 3 to 6 m/s, as such models fly (measured 7.2 and 4.6)."""
+    assert 6.0 < page["stall_speed_m_s"] < 8.0
+    assert 3.0 < page["climb_m_s"] < 6.0
+    assert page["stall_speed_m_s"] < page["climb_speed_m_s"] < page["top_speed_m_s"]
+
+
+def test_json_on_standard_output_is_all_that_is_there(capsys):
+    assert run(["aircraft", "endurance", "--json", "-"]) == 0
+    streams = capsys.readouterr()
+    assert json.loads(streams.out)["aircraft"] == "endurance"
+    assert "best glide" in streams.err
+
+
+def test_page_fits_eighty_columns(capsys):
+    assert run(["aircraft", "endurance"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(len(line) for line in lines) <= 80
+    text = "\n".join(lines)
+    for word in ("stall speed", "best climb", "static margin", "Dutch roll", "Level turns", "Cm_alpha"):
+        assert word in text
+
+
+def test_picture_is_drawn(tmp_path: Path):
+    """A PNG of the page in print quality, with something on it."""
+    path = tmp_path / "page.png"
+    assert run(["aircraft", "endurance", "--picture", str(path)]) == 0
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG")
+    width, height = (int.from_bytes(data[i : i + 4], "big") for i in (16, 20))
+    assert (width, height) == (2100, 1710)
+    assert len(data) > 100_000  # an empty page of this size has 10 kB
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["spitfire"], "unknown aircraft 'spitfire': choose"),
+        (["endurance", "--picture", "page.doc"], "page.doc: end the name in .png"),
+        (["endurance", "--picture", "no/such/page.png"], "there is no folder"),
+        (["endurance", "--json", "no/such/page.json"], "there is no folder"),
+    ],
+)
+def test_mistake_is_one_line_and_code_2(arguments, words, capsys):
+    assert run(["aircraft", *arguments]) == 2
+    streams = capsys.readouterr()
+    assert streams.out == ""
+    assert len(streams.err.splitlines()) == 1
+    assert words in streams.err
