@@ -97,7 +97,7 @@ def test_pitching_moment_has_one_stable_trim_over_all_angles(model):
 
 
 def test_static_margin_is_that_of_a_trainer(model):
-    """Neutral point 10 to 20 % of the chord behind the centre of gravity (measured 18 and 17)."""
+    """Neutral point 10 to 20 % of the chord behind the centre of gravity (measured 16 and 17)."""
     assert 0.10 < -model.slope("aero/moment/pitch-alpha") / model.slope("aero/force/lift-alpha") < 0.20
 
 

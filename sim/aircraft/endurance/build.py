@@ -15,7 +15,7 @@ from sim.aircraft.masses import Box, Spread
 DESIGN = Design(
     folder=Path(__file__).parent,
     about="Electric model aeroplane, see PROVENANCE.md",
-    sections=Sections(wing="clarky", tail="naca0006", tail_incidence_deg=-0.78, wing_incidence_deg=1.3),
+    sections=Sections(wing="clarky", tail="naca0006", tail_incidence_deg=-0.42, wing_incidence_deg=1.3),
     parts=(
         Spread("spars and edges", 0.130, power=0.0, part=0.35),
         Spread("ribs, sheeting and covering", 0.150, power=2.0, part=0.45),
@@ -25,7 +25,7 @@ DESIGN = Design(
         Box("fin and rudder", 0.025, (-0.67, 0.0, -0.100), (0.15, 0.006, 0.20)),
         Box("motor and propeller", 0.150, (0.370, 0.0, 0.0), (0.06, 0.03, 0.03)),
         Box("speed controller", 0.040, (0.270, 0.0, 0.020), (0.06, 0.03, 0.01)),
-        Box("battery", 0.310, (0.079, 0.0, 0.039), (0.11, 0.035, 0.035)),
+        Box("battery", 0.310, (0.073, 0.0, 0.039), (0.11, 0.035, 0.035)),
         Box("skid and hatch", 0.060, (0.100, 0.0, 0.070), (0.30, 0.03, 0.01)),
         Box("servos and receiver", 0.175, (-0.060, 0.0, 0.030), (0.15, 0.05, 0.04)),
     ),
@@ -51,7 +51,7 @@ DESIGN = Design(
         stopped_area_m2=0.0045,
         tail_in_wash=0.4,
         fin_in_wash=0.5,
-        roll_rig=0.00092,
+        roll_rig=0.0009188,
     ),
 )  # fmt: skip
 
