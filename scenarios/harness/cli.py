@@ -58,6 +58,15 @@ TurbulenceOption = Annotated[
 ThermalsOption = Annotated[
     str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
 ]
+AircraftOption = Annotated[str | None, typer.Option("--aircraft", help="Name of an aircraft.")]
+AutopilotOption = Annotated[
+    str | None, typer.Option("--autopilot", help="Registered name, module:Class or file.py:Class.")
+]
+GpsRateOption = Annotated[float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS.")]
+ImuRateOption = Annotated[
+    int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
+]
+SensorsOption = Annotated[str | None, typer.Option("--sensors", help="Name of a sensor suite.")]
 JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
@@ -124,16 +133,16 @@ def list_(json_: JsonOption = None) -> None:
 def fly(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
     estimator: EstimatorOption = None,
-    aircraft: Annotated[str | None, typer.Option(help="Name of an aircraft.")] = None,
-    autopilot: Annotated[str | None, typer.Option(help="Registered name, module:Class or file.py:Class.")] = None,
+    aircraft: AircraftOption = None,
+    autopilot: AutopilotOption = None,
     wind: WindOption = None,
     shear: ShearOption = None,
     gust: GustOption = None,
     turbulence: TurbulenceOption = None,
     thermals: ThermalsOption = None,
-    gps_rate: Annotated[float | None, typer.Option(metavar="HZ", help="Reports of the GPS.")] = None,
-    imu_rate: Annotated[int | None, typer.Option(metavar="HZ", help="Gyro, accelerometer and the loop.")] = None,
-    sensors: Annotated[str | None, typer.Option(help="Name of a sensor suite.")] = None,
+    gps_rate: GpsRateOption = None,
+    imu_rate: ImuRateOption = None,
+    sensors: SensorsOption = None,
     duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the flight after the release.")] = None,
     seed: Annotated[int, typer.Option(help="Another seed, another flight; the same seed, the same bits.")] = 0,
     set_: SetOption = None,
@@ -146,19 +155,12 @@ def fly(
     """Fly a scenario once, record it, judge it."""
     from scenarios.harness import single, viewing
 
-    named = {
-        "estimator": estimator,
-        "aircraft": aircraft,
-        "autopilot": autopilot,
-        "rates.gps_hz": gps_rate,
-        "rates.imu_hz": imu_rate,
-        "suite": sensors,
-        "duration_s": duration,
-        "seed": seed,
-    }
+    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors) | _given(
+        {"estimator": estimator, "duration_s": duration, "seed": seed}
+    )
     with _reporting(json_) as report:
         with usage():
-            changes = _changes(set_) | _given(named) | _air(wind, shear, gust, turbulence, thermals)
+            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
             flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web)
         single.tell(flown)
         report(flown.to_json())
@@ -177,6 +179,11 @@ def check(
     gust: GustOption = None,
     turbulence: TurbulenceOption = None,
     thermals: ThermalsOption = None,
+    aircraft: AircraftOption = None,
+    autopilot: AutopilotOption = None,
+    gps_rate: GpsRateOption = None,
+    imu_rate: ImuRateOption = None,
+    sensors: SensorsOption = None,
     set_: SetOption = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
@@ -190,7 +197,8 @@ def check(
         with usage():
             for path in (junit, markdown):
                 _check_file(path)
-            changes = _changes(set_) | _air(wind, shear, gust, turbulence, thermals)
+            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors)
+            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
@@ -273,6 +281,14 @@ def _changes(assignments: list[str] | None) -> dict[str, Any]:
             raise _refusal(f"--set {text!r}: write name=value, for instance gps.latency_s=0.5")
         changes[name.strip()] = value.strip()
     return changes
+
+
+def _fitted(
+    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None
+) -> dict[str, Any]:
+    """What flies and what it carries, by the names of the configuration."""
+    named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
+    return _given(named | {"suite": suite})
 
 
 def _given(named: dict[str, Any]) -> dict[str, Any]:
