@@ -55,7 +55,8 @@ def is_cold() -> bool:
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` to machine code on first call, cached on disk; division by zero gives inf, not an error.
 
-    Used as a plain decorator.  A kernel takes few, array-typed arguments and allocates nothing.
+    Used as a plain decorator.  A kernel of the loop takes few, array-typed arguments and
+    allocates nothing.
     """
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_dir())

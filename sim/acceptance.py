@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.interface import ActuatorCommand, Autopilot, Setpoint
-from estimator.interface import Array, AttitudeEstimate, AttitudeEstimator, Measurements
+from autopilot.interface import ActuatorCommand, Autopilot, Mode, Setpoint
+from estimator.interface import Array, AttitudeEstimate, AttitudeEstimator, Health, Measurements
 from estimator.jit import kernel
 from sim.log import Outcome
 
+N_HEALTH, N_MODES = len(Health), len(Mode)
 ROTATION_TOLERANCE = 1e-2  # largest |R R^T - I| that is still taken for a rotation
 _UNKNOWN_WIND = np.full(3, np.nan)
 _FAULTS = {
@@ -24,7 +25,13 @@ _FAULTS = {
     3: f"R_eb is no rotation: |R R^T - I| above {ROTATION_TOLERANCE:g}, or a reflection",
     4: "omega_b_rad_s is not finite",
     5: "gyro_bias_b_rad_s is not finite",
+    6: f"health is no Health: {', '.join(f'{h} {h.name}' for h in Health)}",
 }
+_COMMAND_FAULTS = {
+    1: "aileron {0:g}, elevator {1:g}, rudder {2:g}, throttle {3:g}: must be within -1..1, the throttle within 0..1",
+    2: f"mode {{4}} is no Mode: {', '.join(f'{m} {m.name}' for m in Mode)}",
+}
+_VECTORS = ((3, 3), (3,), (3,), (3,))
 
 
 class Unusable(ValueError):
@@ -42,8 +49,6 @@ class FlightCodeFailed(RuntimeError):
 @kernel
 def _record_estimate(flown, k, R_eb, omega, bias, wind, health):  # type: ignore[no-untyped-def]
     """Write the estimate into row `k`; returns 0, or the number of the fault."""
-    if R_eb.shape != (3, 3) or omega.shape[0] != 3 or bias.shape[0] != 3 or wind.shape[0] != 3:
-        return 1
     row = flown[k]
     worst = 0.0
     for i in range(3):
@@ -56,6 +61,8 @@ def _record_estimate(flown, k, R_eb, omega, bias, wind, health):  # type: ignore
                 return 2
             worst = max(worst, off)
     row.health = health
+    if health < 0 or health >= N_HEALTH:
+        return 6
     determinant = (
         R_eb[0, 0] * (R_eb[1, 1] * R_eb[2, 2] - R_eb[1, 2] * R_eb[2, 1])
         + R_eb[0, 1] * (R_eb[1, 2] * R_eb[2, 0] - R_eb[1, 0] * R_eb[2, 2])
@@ -72,11 +79,14 @@ def _record_estimate(flown, k, R_eb, omega, bias, wind, health):  # type: ignore
 
 @kernel
 def _record_command(flown, k, aileron, elevator, rudder, throttle, mode, bank, pitch):  # type: ignore[no-untyped-def]
-    """Write the command into row `k`; returns whether all four are finite."""
+    """Write the command into row `k`; returns 0, or the number of the fault."""
     row = flown[k]
     row.aileron, row.elevator, row.rudder, row.throttle = aileron, elevator, rudder, throttle
     row.mode, row.bank_demand_rad, row.pitch_demand_rad = mode, bank, pitch
-    return np.isfinite(aileron + elevator + rudder + throttle)
+    if mode < 0 or mode >= N_MODES:
+        return 2
+    within = abs(aileron) <= 1.0 and abs(elevator) <= 1.0 and abs(rudder) <= 1.0 and 0.0 <= throttle <= 1.0
+    return 0 if within else 1  # NaN is not within
 
 
 def _as_floats(value: Any) -> Array:
@@ -90,21 +100,22 @@ def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> None:
     R_eb, omega, bias, wind, health = e
     if wind is None:
         wind = _UNKNOWN_WIND
-    if not (R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray and R_eb.ndim == 2):
+    if not (R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray):
         R_eb, omega, bias, wind = _as_floats(R_eb), _as_floats(omega), _as_floats(bias), _as_floats(wind)
-        if (R_eb.shape, omega.shape, bias.shape, wind.shape) != ((3, 3), (3,), (3,), (3,)):
-            raise Unusable(_FAULTS[1])
+    if (R_eb.shape, omega.shape, bias.shape, wind.shape) != _VECTORS:
+        raise Unusable(_FAULTS[1])
     fault = _record_estimate(flown, k, R_eb, omega, bias, wind, int(health))
     if fault:
         raise Unusable(_FAULTS[fault])
 
 
 def record_command(flown: NDArray[Any], k: int, command: ActuatorCommand) -> None:
-    """Write `command` into row `k` of `flown`; Unusable where it is not finite."""
+    """Write `command` into row `k` of `flown`; Unusable where it is none."""
     if command.__class__ is not ActuatorCommand:
         raise Unusable(f"update() returned {type(command).__name__}, must return an ActuatorCommand")
-    if not _record_command(flown, k, *command):
-        raise Unusable(f"the command is not finite: {tuple(float(c) for c in command[:4])}")
+    fault = _record_command(flown, k, *command)
+    if fault:
+        raise Unusable(_COMMAND_FAULTS[fault].format(*command))
 
 
 @contextmanager
@@ -117,7 +128,8 @@ def blaming(outcome: Outcome, who: object, t_s: float) -> Iterator[None]:
 
 
 def _failure(outcome: Outcome, who: object, t_s: float, error: Exception) -> FlightCodeFailed:
-    text = " ".join(str(error).split()) or "no message"
+    lines = str(error).split("\n")  # the first line of numba's says enough
+    text = " ".join(lines[0].split()) or "no message"
     fault = text if isinstance(error, Unusable) else f"{type(error).__name__}: {text}"
     return FlightCodeFailed(outcome, who, t_s, fault)
 

@@ -19,7 +19,7 @@ from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
 from sim.jsbsim_model import FT_TO_M, LATITUDE_DEG, LB_TO_N, LONGITUDE_DEG, WIND, WRITE, Model
 from sim.log import Log, Outcome, Phase
-from sim.plant import HandThrow, InFlight, Start
+from sim.plant import HandThrow, InFlight, SimulationDiverged, Start
 from sim.trim import Trim, trim
 from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
 
@@ -131,7 +131,7 @@ class JsbsimPlant:
     air : wind, gusts, turbulence, thermals
     rates : physics and inertial rates
     seed, flight : which random streams (the turbulence alone draws any here)
-    box : where the flight may be
+    box : where the flight may be; a start outside it is refused
 
     Raises ValueError for an unknown aircraft or a start that cannot be.
     """
@@ -164,6 +164,12 @@ class JsbsimPlant:
             if not (math.isfinite(start.heading_rad) and 0.0 < start.height_m < 10_000.0):
                 raise ValueError(
                     f"height_m {start.height_m} m: must be above 0 and below 10000 m, with a finite heading"
+                )
+            out_m = math.hypot(start.north_m, start.east_m)
+            if not (out_m < box.radius_m and start.height_m < box.height_m):
+                raise ValueError(
+                    f"start {out_m:g} m out and {start.height_m:g} m high: must be inside the flight box, "
+                    f"box_radius_m {box.radius_m:g} m and box_height_m {box.height_m:g} m"
                 )
             airspeed_m_s = self.trimmed.airspeed_m_s if start.airspeed_m_s is None else start.airspeed_m_s
             self.trimmed = trim(self.model, airspeed_m_s, start.height_m, heading_rad=start.heading_rad)
@@ -239,8 +245,11 @@ class JsbsimPlant:
             return self._in_hand(k, command)
         self._command(command)
         run = self.model.run
-        for _ in range(self.steps):
-            run()
+        try:
+            for _ in range(self.steps):
+                run()
+        except RuntimeError as error:  # JSBSim's own: it will not go on from here
+            raise SimulationDiverged(f"JSBSim gave up at {k * self.dt_s:.2f} s: {error}") from error
         return self._observe(k)
 
     def _blow(self, *air: float) -> None:
@@ -258,7 +267,13 @@ class JsbsimPlant:
 
     def _observe(self, k: int) -> Outcome | None:
         self._pack(self._buffer, 0, *[read() for read in self._getters])
-        return OUTCOMES[observe(self._truth, k, self._state)]
+        ended = OUTCOMES[observe(self._truth, k, self._state)]
+        if ended is Outcome.DIVERGED:
+            speed_m_s, rate_rad_s = (np.linalg.norm(self._truth[name][k]) for name in ("v_e_m_s", "omega_b_rad_s"))
+            raise SimulationDiverged(
+                f"the simulation blew up at {(k + 1) * self.dt_s:.2f} s: {speed_m_s:.3g} m/s, {rate_rad_s:.3g} rad/s"
+            )
+        return ended
 
     def run_bare(self, n_ticks: int) -> None:
         """The physics of `n_ticks` and nothing else, commands as they are: what a benchmark compares with."""

@@ -51,10 +51,7 @@ def fly(
     try:
         plant.reset(log)
         suite.reset(log)
-        if isinstance(estimator, Oracle):
-            estimator.watch(log)
-        if hasattr(autopilot, "reset"):
-            autopilot.reset()
+        make_ready(estimator, autopilot, log)
         n_calibration = round(calibration_s / plant.dt_s)
         for k in range(len(log)):
             ended = plant.advance(k, command)
@@ -66,7 +63,7 @@ def fly(
                 record_command(log.flown, k, command)
                 continue
             if k == n_calibration:
-                _power_up(estimator, log, n_calibration)
+                power_up(estimator, log, n_calibration)
             setpoint = script.at(k * plant.dt_s + to_release_s)
             estimate = estimate_of(estimator, measured, log.flown, k)
             command = command_of(autopilot, estimate, measured, setpoint, log.flown, k)
@@ -86,7 +83,16 @@ def fly(
     return Flight(flown, plant.dt_s, plant.release_s, outcome, reference, message, events, manifest or {})
 
 
-def _power_up(estimator: AttitudeEstimator, log: Log, n_ticks: int) -> None:
+def make_ready(estimator: AttitudeEstimator, autopilot: Autopilot, log: Log) -> None:
+    """Reset the autopilot; show the oracle, and nobody else, the log of the flight to come."""
+    if isinstance(estimator, Oracle):
+        estimator.watch(log)
+    if hasattr(autopilot, "reset"):
+        with blaming(Outcome.AUTOPILOT_FAILED, autopilot, 0.0):
+            autopilot.reset()
+
+
+def power_up(estimator: AttitudeEstimator, log: Log, n_ticks: int) -> None:
     """Switch the estimator on with the mean inertial sample of the first `n_ticks`, or None where there are none."""
     if not hasattr(estimator, "reset"):
         return

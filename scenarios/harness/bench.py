@@ -26,7 +26,7 @@ from sim.acceptance import command_of, estimate_of
 from sim.clock import Rates
 from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Flight, Log, Outcome
-from sim.loop import fly
+from sim.loop import fly, make_ready, power_up
 from sim.plant import InFlight
 from sim.sensors.suite import Suite
 
@@ -113,9 +113,12 @@ class Cruise:
         self.setpoint = Setpoint(Mode.COURSE, course_rad=0.0, height_m=60.0)
 
     def pilots(self) -> tuple[AttitudeEstimator, Autopilot]:
-        """A new estimator and a new autopilot."""
+        """A new estimator and a new autopilot, switched on."""
         estimator = load_estimator(self.spec)
-        return estimator, load_autopilot("dcm", heading_reference_of(estimator))
+        autopilot = load_autopilot("dcm", heading_reference_of(estimator))
+        make_ready(estimator, autopilot, self.log)
+        power_up(estimator, self.log, 0)
+        return estimator, autopilot
 
     def closed_us(self) -> float:
         """The closed loop, microseconds a tick."""

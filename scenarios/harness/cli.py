@@ -144,7 +144,9 @@ def fly(
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
     duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the flight after the release.")] = None,
-    seed: Annotated[int, typer.Option(help="Another seed, another flight; the same seed, the same bits.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(help="Another seed, another flight; the same seed, the same bits. [default: 0]")
+    ] = None,
     set_: SetOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the recording.")] = FLIGHTS,
     no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
@@ -199,6 +201,8 @@ def check(
                 _check_file(path)
             named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors)
             changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
+            if "seed" in changes:
+                raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:

@@ -100,6 +100,7 @@ class FlightConfig(_Model):
     estimator_params : fields of the estimator's parameter dataclass
     duration_s : after the release          suite, sensors : name of the suite, and fields changed in it by their
     dotted names, ``{"gps.latency_s": 1.0}``            manoeuvre : the scenario's own parameters
+    box_radius_m, box_height_m : of the cylinder around the launch point; beyond it the flight is over
     seed, flight : campaign and number of the flight in it, which name the random streams
     """
 
@@ -114,6 +115,8 @@ class FlightConfig(_Model):
     air: AirConfig = Field(default_factory=AirConfig)
     start: Annotated[InFlightStart | HandThrowStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
+    box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
+    box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
     seed: int = Field(default=0, ge=0)
     flight: int = Field(default=0, ge=0)
 

@@ -11,7 +11,7 @@ from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, o
 from scenarios.harness.fitted import changed, suite_params
 from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator
 from scenarios.harness.scenario import Scenario
-from sim.jsbsim_plant import JsbsimPlant
+from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Flight, Log
 from sim.loop import Watch, fly
 from sim.plant import HandThrow, InFlight, Start
@@ -73,6 +73,7 @@ def fly_config(
         rates=rates,
         seed=config.seed,
         flight=config.flight,
+        box=FlightBox(config.box_radius_m, config.box_height_m),
     )
     flown = fly(
         plant,

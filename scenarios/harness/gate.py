@@ -103,11 +103,12 @@ def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], N
 
     Returns
     -------
-    the verdict on the flights that were finished, and whether these are all: Ctrl-C leaves some out
+    the verdict on the flights that were finished, and whether these are all: Ctrl-C leaves some out, and so does a
+    worker process that was killed (one line says so)
 
     Raises
     ------
-    ValueError      as `fly_scenario` does          WorkerDied      where a process was killed
+    ValueError      as `fly_scenario` does
     """
     done: dict[int, FlightVerdict] = {}
 
@@ -125,6 +126,8 @@ def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], N
             _fly_over_processes(tasks, workers, keep)
     except KeyboardInterrupt:
         pass  # what has been finished is judged; the caller sees that flights are missing
+    except WorkerDied as problem:
+        console.error(str(problem))
     return Verdict.of((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(done) == len(tasks)
 
 

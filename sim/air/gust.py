@@ -41,7 +41,8 @@ class Gust:
 
 @kernel
 def add_gusts(t_s, gusts, wind_e):  # type: ignore[no-untyped-def]
-    """Add to `wind_e`, shape (3,), what blows at `t_s` since the release; `gusts` as `gust_rows` makes them."""
+    """Add to `wind_e`, shape (3,), what blows at `t_s` since the release; `gusts` as
+    `MovingAir` lays them out: peak (3), begin, length."""
     for i in range(gusts.shape[0]):
         part = (t_s - gusts[i, 3]) / gusts[i, 4]
         if 0.0 < part < 1.0:

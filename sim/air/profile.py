@@ -15,5 +15,5 @@ REFERENCE_HEIGHT_M: Final = 10.0  # at which weather stations measure
 
 @kernel
 def share_of_wind(height_m, shear):  # type: ignore[no-untyped-def]
-    """Wind at `height_m` above the ground over that at the reference height; nothing blows below the ground."""
+    """Wind at `height_m` above the ground over that at the reference height; below the ground as on it."""
     return (max(height_m, 0.0) / REFERENCE_HEIGHT_M) ** shear

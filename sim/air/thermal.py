@@ -32,7 +32,7 @@ SHAPES = np.array(
     ]
 )
 SPACING_HEIGHT = 0.4  # of the inversion: where the report counts the thermals of an area
-WIDEST = 0.0777  # largest outer radius over the inversion height: 0.102 x^(1/3) (1 - x / 4), at x = 1 and below
+WIDEST = 0.0765  # largest outer radius over the inversion height: 0.102 x^(1/3) (1 - x / 4), at x = 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from sim.clock import Rates
 from sim.jsbsim_model import LATITUDE_DEG, Model
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Log, Outcome, Phase
-from sim.plant import HandThrow, InFlight
+from sim.plant import HandThrow, InFlight, SimulationDiverged
 from sim.truth import gravity_m_s2
 
 G_M_S2 = gravity_m_s2(math.radians(LATITUDE_DEG))
@@ -299,11 +299,12 @@ def test_outcome_flying_out_of_the_box_is_left_box():
 
 
 def test_outcome_not_a_number_is_diverged():
-    """A motion that is no number ends the flight, without an exception."""
+    """A motion that is no number ends the flight with the time and what it was."""
     plant = JsbsimPlant(start=LEVEL)
     plant.reset(Log.empty(2))
     plant.begin((0.0, 0.0, -100.0), (0.0, 0.0, 0.0), np.array([math.nan, 0.0, 0.0]))
-    assert plant.advance(0, NEUTRAL) is Outcome.DIVERGED
+    with pytest.raises(SimulationDiverged, match=r"blew up at 0\.02 s: nan m/s"):
+        plant.advance(0, NEUTRAL)
     _, outcome, _ = flown(plant, 1.0, cruise(plant))
     assert outcome is None  # and a reset brings it back
 

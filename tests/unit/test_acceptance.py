@@ -50,6 +50,8 @@ def test_record_estimate_of_lists_and_single_precision_is_accepted(flown):
         ({"R_eb": np.eye(3), "omega_b_rad_s": np.array([0.0, np.inf, 0.0])}, "omega_b_rad_s"),
         ({"R_eb": np.eye(3), "gyro_bias_b_rad_s": np.array([np.nan, 0.0, 0.0])}, "gyro_bias_b_rad_s"),
         ({"R_eb": np.eye(3), "omega_b_rad_s": np.zeros(2)}, "shape"),
+        ({"R_eb": np.eye(3), "omega_b_rad_s": np.zeros((3, 1))}, "shape"),
+        ({"R_eb": np.eye(3), "health": 9}, "health is no Health: 0 STARTING, 1 GOOD, 2 POOR"),
     ],
 )
 def test_record_estimate_of_an_unusable_answer_is_refused_by_name(flown, change, fault):
@@ -68,9 +70,17 @@ def test_estimate_of_an_estimator_that_raises_names_class_time_and_fault(flown):
     assert caught.value.outcome == Outcome.ESTIMATOR_FAILED
 
 
-def test_record_command_that_is_not_finite_is_refused(flown):
-    with pytest.raises(Unusable, match="not finite"):
-        record_command(flown, 0, ActuatorCommand(0.0, math.nan, 0.0, 0.0))
+@pytest.mark.parametrize(
+    "command", [(0.0, math.nan, 0.0, 0.0), (50.0, 0.0, 0.0, 0.0), (0.0, 0.0, -1.001, 0.0), (0.0, 0.0, 0.0, -0.1)]
+)
+def test_record_command_outside_what_a_servo_can_do_is_refused(flown, command):
+    with pytest.raises(Unusable, match=r"must be within -1\.\.1, the throttle within 0\.\.1"):
+        record_command(flown, 0, ActuatorCommand(*command))
+
+
+def test_record_command_in_an_unknown_mode_is_refused_with_those_there_are(flown):
+    with pytest.raises(Unusable, match=r"mode 77 is no Mode: 0 MANUAL, .*5 LAUNCH"):
+        record_command(flown, 0, ActuatorCommand(0.0, 0.0, 0.0, 0.0, 77))
 
 
 @pytest.mark.parametrize("answer", [None, np.eye(3), (np.eye(3), np.zeros(3))])

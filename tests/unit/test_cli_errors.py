@@ -38,6 +38,8 @@ FLY = ("fly", "hand_launch")
         (("check", "--workers", "0"), "'--workers'"),
         (("check", "--estimator", "premelani"), "did you mean premerlani?"),
         (("check", "--junit", "nowhere/junit.xml"), "there is no folder nowhere"),
+        (("check", "--set", "seed=4"), "name the seeds to fly with --seeds"),
+        (("fly", "crosswind", "--set", "start.height_m=1500"), "inside the flight box"),
         (("bench", "--estimator", "premelani"), "did you mean premerlani?"),
         (("view", "no_flight"), "no_flight"),
         (("view",), "fly first"),
