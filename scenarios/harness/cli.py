@@ -337,8 +337,15 @@ def _check_file(path: Path | None) -> None:
         raise _refusal(f"cannot write to {path}: it is a folder")
     if not path.parent.is_dir():
         raise _refusal(f"cannot write to {path}: there is no folder {path.parent}")
-    if not os.access(path if path.exists() else path.parent, os.W_OK):
+    # A file is replaced, which its folder must allow; a device or a pipe is written to.
+    target = path.resolve()
+    if not os.access(target if _is_stream(target) else target.parent, os.W_OK):
         raise _refusal(f"cannot write to {path}: permission denied")
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether `path` is there, and is neither a file nor a folder: /dev/stdout, a pipe."""
+    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def _write(path: Path | None, text: Callable[[], str]) -> None:
@@ -347,5 +354,9 @@ def _write(path: Path | None, text: Callable[[], str]) -> None:
         return
     from sim.recording import replacing
 
-    with usage(), replacing(path) as temporary:
+    target = path.resolve()  # what a link points to is replaced, not the link
+    if _is_stream(target):
+        target.write_text(text(), encoding="utf-8")
+        return
+    with usage(), replacing(target) as temporary:
         temporary.write_text(text(), encoding="utf-8")

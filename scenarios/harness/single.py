@@ -90,8 +90,15 @@ def tell(flown: Flown) -> None:
 
 
 def _free_folder(into: Path, scenario: str, config: FlightConfig) -> Path:
-    """A folder that is not there yet: no flight is ever written over another."""
+    """A new folder, made here: no flight is ever written over another, whoever else is flying."""
     estimator = config.estimator.rpartition(":")[2]
     name = f"{scenario}-{estimator}-seed{config.seed}"
-    tries = (into / (name if i == 1 else f"{name}-{i}") for i in range(1, 1_000_000))
-    return next(path for path in tries if not path.exists())
+    i = 1
+    while True:
+        path = into / (name if i == 1 else f"{name}-{i}")
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            i += 1
+        else:
+            return path

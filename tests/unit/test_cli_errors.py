@@ -1,5 +1,6 @@
 """Bad input on the command line: one clear line, exit code 2, nothing written."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -72,3 +73,25 @@ def test_json_into_a_folder_is_refused(tmp_path: Path, capfd) -> None:
     """A report cannot replace a folder."""
     assert run([*FLY, "--json", str(tmp_path)]) == 2
     assert "it is a folder" in capfd.readouterr().err
+
+
+def test_json_into_a_link_is_written_where_it_points(tmp_path: Path) -> None:
+    """A link stays a link."""
+    (tmp_path / "there.json").write_text("old")
+    (tmp_path / "here.json").symlink_to("there.json")
+    assert run(["list", "--json", str(tmp_path / "here.json")]) == 0
+    assert (tmp_path / "here.json").is_symlink()
+    assert "hand_launch" in (tmp_path / "there.json").read_text()
+
+
+def test_json_into_a_pipe_is_written_into_it(tmp_path: Path) -> None:
+    """A pipe (or a device) is not replaced by a file."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        assert run(["list", "--json", str(pipe)]) == 0
+        assert pipe.is_fifo()
+        assert b"hand_launch" in os.read(reader, 100_000)
+    finally:
+        os.close(reader)
