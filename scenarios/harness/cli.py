@@ -207,13 +207,13 @@ def check(
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
                 verdict, whole = gate.fly_all(tasks, workers or _processors(), advance)
-        gate.tell(verdict)
+        if whole:
+            _write(junit, verdict.to_junit)
+            _write(markdown, verdict.to_markdown)
+        report(verdict.to_json() | ({} if whole else {"passed": False, "interrupted": True}))
+        gate.tell(verdict)  # last: a reader who closes the pipe loses no report
         if not whole:
-            report(verdict.to_json() | {"passed": False, "interrupted": True})
             return INTERRUPTED
-        _write(junit, verdict.to_junit)
-        _write(markdown, verdict.to_markdown)
-        report(verdict.to_json())
     return verdict.exit_code
 
 
@@ -252,13 +252,13 @@ def aircraft(
             _check_file(picture)
             handbook.check_picture(picture)
             book = handbook.make(name)
-        handbook.tell(book)
         if picture is not None:
             from scenarios.harness import handbook_picture
 
             with usage():
                 handbook_picture.draw(book, picture)
         report(book.to_json())
+        handbook.tell(book)  # last: a reader who closes the pipe loses no file
 
 
 @app.command()
