@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from estimator.compiled import BELIEF, Compiled, write_estimate
-from estimator.interface import Column, HeadingReference, ImuSample, dtype_of
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.rotation import integrate, level, renormalise
 from estimator.screening import (
@@ -79,6 +79,7 @@ class GyroOnly(Compiled):
     """Eqns 16-21 without drift correction: gyros from power-up on, the offset measured there."""
 
     heading_reference: HeadingReference = "nose"
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro",)
     _step: ClassVar[Any] = staticmethod(step)
     _replay: ClassVar[Any] = staticmethod(_replay)
     _tilt_from_force = False
@@ -100,4 +101,5 @@ class GyroOnly(Compiled):
 class AccelerometerOnly(GyroOnly):
     """Tilt straight from the accelerometer at every sample, heading from the gyros."""
 
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer")
     _tilt_from_force = True

@@ -1,7 +1,8 @@
 """The Python side of a compiled estimator: its state is one record, its step one kernel.
 
 An estimator module owns its kernel ``step(rows, k, state) -> Health``, runs it over a log in a kernel ``replay``,
-and lets `Compiled` speak the `AttitudeEstimator` protocol.  Its state starts with the columns of `BELIEF`.
+and lets `Compiled` speak the `AttitudeEstimator` protocol.  Its state starts with the columns of `BELIEF`, and has
+those of `WIND` if it estimates the wind; its replay then calls `write_wind` as well.
 """
 
 from typing import Any, ClassVar
@@ -9,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.interface import AttitudeEstimate, Column, Health, Measurements, dtype_of
+from estimator.interface import AttitudeEstimate, Column, Health, Instrument, Measurements, dtype_of
 from estimator.jit import kernel
 
 BELIEF = (
@@ -17,7 +18,15 @@ BELIEF = (
     Column("omega_b_rad_s", (3,), "drift-corrected rate"),
     Column("gyro_bias_b_rad_s", (3,), "what the gyro is believed to read too much"),
 )
-ESTIMATE = (*BELIEF, Column("health", (), "0 starting, 1 good, 2 poor", integer=True))
+WIND = (
+    Column("wind_e_m_s", (3,), "estimated velocity of the air over the ground"),
+    Column("wind_known", (), "1 once there is an estimate of it", integer=True),
+)
+ESTIMATE = (
+    *BELIEF,
+    Column("wind_e_m_s", (3,), "estimated wind, NaN where not estimated"),
+    Column("health", (), "0 starting, 1 good, 2 poor", integer=True),
+)
 ESTIMATE_DTYPE = dtype_of(ESTIMATE)
 
 _HEALTH = tuple(Health)  # an index into a tuple costs a tenth of a call of the enumeration
@@ -34,9 +43,21 @@ def write_estimate(s, health, estimate):  # type: ignore[no-untyped-def]
             estimate.R_eb[i, j] = s.R_eb[i, j]
 
 
-class Compiled:
-    """An estimator around the kernels `_step` and `_replay` and a state record; a subclass brings these and `reset`."""
+@kernel
+def write_wind(s, estimate):  # type: ignore[no-untyped-def]
+    """Copy the wind that the state record `s` believes in into a record of ESTIMATE, where it is known."""
+    if s.wind_known:
+        for i in range(3):
+            estimate.wind_e_m_s[i] = s.wind_e_m_s[i]
 
+
+class Compiled:
+    """An estimator around the kernels `_step` and `_replay` and a state record; a subclass brings these and `reset`.
+
+    uses : which measurements it can make something of, for tables that say what each estimator was given
+    """
+
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps")
     _step: ClassVar[Any]
     _replay: ClassVar[Any]
 
@@ -45,12 +66,16 @@ class Compiled:
         self._R_eb = self._state["R_eb"][0]
         self._omega_b_rad_s = self._state["omega_b_rad_s"][0]
         self._gyro_bias_b_rad_s = self._state["gyro_bias_b_rad_s"][0]
+        self._estimates_wind = "wind_known" in (state_dtype.names or ())
 
     def update(self, m: Measurements) -> AttitudeEstimate:
         """Take one tick's measurements, return the attitude at its end; the arrays are the caller's to keep."""
         health = self._step(m.rows, m.k, self._state)
+        wind_e_m_s = None
+        if self._estimates_wind and self._state["wind_known"][0]:
+            wind_e_m_s = self._state["wind_e_m_s"][0].copy()
         return AttitudeEstimate(
-            self._R_eb.copy(), self._omega_b_rad_s.copy(), self._gyro_bias_b_rad_s.copy(), None, _HEALTH[health]
+            self._R_eb.copy(), self._omega_b_rad_s.copy(), self._gyro_bias_b_rad_s.copy(), wind_e_m_s, _HEALTH[health]
         )
 
     def replay(self, rows: NDArray[Any]) -> NDArray[Any]:
@@ -62,9 +87,10 @@ class Compiled:
 
         Returns
         -------
-        shape (N,), ESTIMATE_DTYPE: R_eb, omega_b_rad_s, gyro_bias_b_rad_s, health
+        shape (N,), ESTIMATE_DTYPE: R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health
         """
         estimates = np.zeros(len(rows), ESTIMATE_DTYPE)
+        estimates["wind_e_m_s"] = np.nan
         self._replay(rows, self._state, estimates)
         return estimates
 

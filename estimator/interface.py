@@ -178,15 +178,17 @@ class AttitudeEstimate(NamedTuple):
 
 
 HeadingReference = Literal["course", "nose"]
+Instrument = Literal["gyro", "accelerometer", "gps", "magnetometer", "airspeed"]
 
 
 @runtime_checkable
 class AttitudeEstimator(Protocol):
     """The seam.  Only `update` is required of one's own class.
 
-    Optional: ``heading_reference``, "course" (default) or "nose", what the heading converges to; and
+    Optional: ``heading_reference``, "course" (default) or "nose", what the heading converges to;
     ``reset(on_ground)``, called at power-up with the mean inertial sample of the calibration window, or
-    with None where the flight starts in the air.
+    with None where the flight starts in the air; ``uses``, names of the instruments that it can make something
+    of; and ``replay(rows)``, a whole log in one call, see `estimator.compiled`.
     """
 
     def update(self, m: Measurements) -> AttitudeEstimate:

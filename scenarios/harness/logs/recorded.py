@@ -1,0 +1,41 @@
+"""What every reader of logs returns: measured rows, and the reference attitude that the log holds."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from numpy.typing import NDArray
+
+from estimator.interface import Array
+
+
+class LogError(ValueError):
+    """A log that cannot be read or believed; one line that names the file, the line or row, and the column."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """The attitude that a log is scored against.
+
+    R_eb : shape (N, 3, 3), at the times of the rows, NaN where there is none
+    kind : "truth", the output of another "filter", or of the original "firmware"      name : in a few words
+    """
+
+    R_eb: Array
+    kind: Literal["truth", "filter", "firmware"]
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedLog:
+    """A log ready for replay.
+
+    rows : shape (N,), MEASURED_DTYPE, times increasing
+    name : of the file            instruments : those that the log has
+    reference : or None           repairs : what was repaired and how often, a line each
+    """
+
+    rows: NDArray[Any]
+    name: str
+    instruments: tuple[str, ...]
+    reference: Reference | None = None
+    repairs: tuple[str, ...] = ()
