@@ -16,6 +16,7 @@ import numpy as np
 from autopilot.interface import ActuatorCommand
 from estimator.interface import Array
 from sim.air import Air
+from sim.place import LATITUDE_DEG, LONGITUDE_DEG
 from sim.truth import EARTH_RATE_RAD_S
 
 FT_TO_M = 0.3048
@@ -25,7 +26,6 @@ SLUG_TO_KG = LB_TO_N / FT_TO_M
 SLUGFT2_TO_KGM2 = SLUG_TO_KG * FT_TO_M**2
 
 AIRCRAFT = Path(__file__).parent / "aircraft"
-LATITUDE_DEG, LONGITUDE_DEG = 42.80, -73.95  # the launch point, at sea level
 
 WRITE = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
 WIND = tuple(f"atmosphere/wind-{d}-fps" for d in ("north", "east", "down"))

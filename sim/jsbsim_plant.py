@@ -17,8 +17,9 @@ from estimator.jit import kernel
 from sim import hand
 from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
-from sim.jsbsim_model import FT_TO_M, LATITUDE_DEG, LB_TO_N, LONGITUDE_DEG, WIND, WRITE, Model
+from sim.jsbsim_model import FT_TO_M, LB_TO_N, WIND, WRITE, Model
 from sim.log import Log, Outcome, Phase
+from sim.place import LATITUDE_DEG
 from sim.plant import HandThrow, InFlight, SimulationDiverged, Start
 from sim.trim import Trim, trim
 from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
@@ -135,8 +136,6 @@ class JsbsimPlant:
 
     Raises ValueError for an unknown aircraft or a start that cannot be.
     """
-
-    latitude_deg, longitude_deg = LATITUDE_DEG, LONGITUDE_DEG
 
     def __init__(
         self, aircraft: str = "endurance", *, start: Start, air: Air = STILL, rates: Rates | None = None,

@@ -15,9 +15,9 @@ from autopilot.interface import ActuatorCommand
 from estimator.interface import Array
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log, Outcome, Phase
+from sim.place import LATITUDE_DEG
 from sim.truth import earth_rate_e_rad_s, gravity_m_s2
 
-LATITUDE_DEG = 42.80  # of the launch point
 GRAVITY_M_S2 = gravity_m_s2(math.radians(LATITUDE_DEG))
 CALM = (0.0, 0.0, 0.0)
 _NODES = 5  # of the quadrature: exact for polynomials of degree 9 within a tick

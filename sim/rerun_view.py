@@ -24,6 +24,7 @@ from estimator.rotation import from_euler
 from sim.loft import Mesh
 from sim.log import Event, Flight, Log, Phase
 from sim.mesh import Part, aeroplane, geometry_of
+from sim.place import LATITUDE_DEG, LONGITUDE_DEG
 from sim.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, Range, curves, limits
 from sim.recording import digest, replacing
 from sim.story import setting, story
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 
 TIMELINE = "sim_time"
 CONTROLS = ("aileron", "elevator", "rudder")
-LAUNCH_LATITUDE_DEG, LAUNCH_LONGITUDE_DEG = 42.80, -73.95  # where the manifest names no other place
 
 _SKY: Colour = (118, 146, 170)
 _GROUND: Colour = (66, 84, 66)
@@ -128,8 +128,8 @@ class Scene:
         except ValueError:
             geometry = geometry_of("endurance")
         place = (
-            float(setting(manifest, "launch_latitude_deg", LAUNCH_LATITUDE_DEG)),
-            float(setting(manifest, "launch_longitude_deg", LAUNCH_LONGITUDE_DEG)),
+            float(setting(manifest, "launch_latitude_deg", LATITUDE_DEG)),
+            float(setting(manifest, "launch_longitude_deg", LONGITUDE_DEG)),
         )
         return cls(aeroplane(geometry), place, release_s, heading_reference)
 

@@ -21,8 +21,9 @@ _BELOW_TWO_PI = float(np.nextafter(2.0 * np.pi, 0.0))  # a course of -1e-17 must
 
 @dataclass(frozen=True, slots=True)
 class GpsParams:
-    """Behaviour of a GPS receiver; its report rate belongs to `Rates`.  Defaults: a small 4 Hz receiver.
+    """Behaviour of a GPS receiver.  The defaults are a small 4 Hz receiver.
 
+    rate_hz : its report rate, which a flight takes unless it names another (`Rates.gps_hz` is what counts)
     filter_s : time constant of the filter on position and velocity; 0 is none
     latency_s : from the time a fix is true until it arrives
     first_fix_s : time since power-up before which there is no fix
@@ -31,6 +32,7 @@ class GpsParams:
     wander_s : correlation time of that error
     """
 
+    rate_hz: float = 4.0
     filter_s: float = 1.0
     latency_s: float = 0.3
     first_fix_s: float = 1.0
@@ -44,6 +46,7 @@ class GpsParams:
         require(self, "m/s", "velocity_noise_m_s")
         require(self, "m", "wander_horizontal_m", "wander_vertical_m")
         require(self, "s", "wander_s", least=0.001)
+        require(self, "Hz", "rate_hz", least=0.1)
 
 
 UNIT = np.dtype(

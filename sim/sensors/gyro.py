@@ -15,7 +15,18 @@ from numpy.typing import NDArray
 
 from estimator.jit import kernel
 from sim.clock import Rates
-from sim.sensors.noise import Source, convert, random_walk, require, require_converter, sample_sigma, step_of
+from sim.sensors.board import BoardParams
+from sim.sensors.noise import (
+    Output,
+    Source,
+    convert,
+    random_walk,
+    require,
+    require_converter,
+    require_device,
+    sample_sigma,
+    step_of,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,35 +36,61 @@ class GyroParams:
     The defaults are a cheap analogue MEMS part.
 
     bias_deg_s : sigma of the bias at turn-on, constant in a flight
-    drift_deg_s_min : sigma of the steady change of that bias, as in warming up, deg/s per minute
+    bias_per_k_deg_s : sigma of the change of the bias with temperature, deg/s per kelvin
+    bias_instability_deg_s : floor of the Allan deviation, flicker noise's coefficient B of IEEE Std 952
+    drift_deg_s_min : sigma of a steady change of the bias, deg/s per minute
     walk_deg_s_sqrt_s : the bias walks at random, sigma after one second, deg/s per root second
-    noise_deg_s : sigma of the white noise of a sample at 50 Hz; grows with the root of the rate
-    gain : sigma of the relative gain error        cross_axis : sigma of each axis' sensitivity to another
+    noise_density_deg_s_sqrt_hz : one-sided spectral density of the white noise, as data sheets give it
+    gain : sigma of the relative gain error        gain_per_k : sigma of its change with temperature, 1/K
+    nonlinearity : sigma of the largest deviation from the straight line, as a fraction of the full scale
+    cross_axis : sigma of each axis' sensitivity to another, crooked mounting inside the part included
+    g_sensitivity_deg_s_g : sigma of each axis' response to each axis' specific force, deg/s per g
+    bandwidth_hz : -3 dB frequency of its low-pass filter; infinite is none
     range_deg_s : full scale, readings clip at it  bits : of the converter over +-range; 0 is not quantised
+    step_deg_s : one step of the converter, where that is not what range and bits make; 0 is what they make
+    conversions : of the converter averaged in a sample; 0 is a continuous mean
+    output : digital, ratiometric (in proportion to the supply) or absolute (referred to a fixed voltage)
+    null_deg_s : its output voltage without rotation, expressed in deg/s; what a wrong supply adds in proportion
     """
 
     bias_deg_s: float = 1.0
+    bias_per_k_deg_s: float = 0.0
+    bias_instability_deg_s: float = 0.0
     drift_deg_s_min: float = 0.2
     walk_deg_s_sqrt_s: float = 0.01
-    noise_deg_s: float = 0.3
+    noise_density_deg_s_sqrt_hz: float = 0.06
     gain: float = 0.015
+    gain_per_k: float = 0.0
+    nonlinearity: float = 0.0
     cross_axis: float = 0.005
+    g_sensitivity_deg_s_g: float = 0.0
+    bandwidth_hz: float = math.inf
     range_deg_s: float = 300.0
     bits: int = 10
+    step_deg_s: float = 0.0
+    conversions: int = 0
+    output: Output = "digital"
+    null_deg_s: float = 0.0
 
     def __post_init__(self) -> None:
-        require(self, "deg/s", "bias_deg_s", "noise_deg_s")
+        require(self, "deg/s", "bias_deg_s", "bias_instability_deg_s", "step_deg_s", "null_deg_s")
+        require(self, "deg/s/K", "bias_per_k_deg_s")
+        require(self, "deg/s/sqrt(Hz)", "noise_density_deg_s_sqrt_hz")
+        require(self, "1/K", "gain_per_k")
+        require(self, "deg/s/g", "g_sensitivity_deg_s_g")
+        require_device(self)
         require(self, "deg/s/min", "drift_deg_s_min")
         require(self, "deg/s/sqrt(s)", "walk_deg_s_sqrt_s")
-        require(self, "(a fraction)", "gain", "cross_axis")
+        require(self, "(a fraction)", "gain", "cross_axis", "nonlinearity")
         require_converter(self, "deg/s", "range_deg_s")
 
 
 UNIT = np.dtype([("M", "f8", (3, 3)), ("step_rad_s", "f8"), ("range_rad_s", "f8")], align=True)
+MEMORY = np.dtype([("filtered", "f8", (3,))], align=True)  # state of the low-pass filter
 NOISE = (("gyro_bias_b_rad_s", "f8", (3,)), ("gyro_noise_b_rad_s", "f8", (3,)))
 
 
-def make(params: GyroParams, source: Source, unit: NDArray[np.void]) -> None:
+def make(params: GyroParams, board: BoardParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
     """Make one gyro: draw the errors that stay for life into `unit`, shape (1,) of UNIT."""
     M = np.diag(1.0 + params.gain * source("gyro gain").standard_normal(3))
     off_diagonal = ~np.eye(3, dtype=bool)
@@ -63,7 +100,7 @@ def make(params: GyroParams, source: Source, unit: NDArray[np.void]) -> None:
     unit["step_rad_s"] = step_of(math.radians(params.range_deg_s), params.bits)
 
 
-def draw(params: GyroParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
+def draw(params: GyroParams, board: BoardParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
     """Draw bias and noise of every tick of a flight into the columns NOISE of `noise`, shape (n,)."""
     n, dt_s = len(noise), rates.dt_s
     t_s = np.arange(1, n + 1)[:, None] * dt_s
@@ -72,11 +109,11 @@ def draw(params: GyroParams, rates: Rates, source: Source, noise: NDArray[np.voi
     walk = random_walk(source("gyro walk").standard_normal((n, 3)), params.walk_deg_s_sqrt_s, dt_s)
     white = source("gyro noise").standard_normal((n, 3))
     noise["gyro_bias_b_rad_s"] = np.radians(turn_on + drift * t_s + walk)
-    noise["gyro_noise_b_rad_s"] = np.radians(sample_sigma(params.noise_deg_s, rates.imu_hz)) * white
+    noise["gyro_noise_b_rad_s"] = np.radians(sample_sigma(params.noise_density_deg_s_sqrt_hz, rates.imu_hz)) * white
 
 
 @kernel
-def measure_rate(truth, measured, noise, k, unit):  # type: ignore[no-untyped-def]
+def measure_rate(truth, measured, noise, k, unit, memory):  # type: ignore[no-untyped-def]
     """Fill the gyro reading of row `k`, and the bias in the truth; `unit` is a record of UNIT."""
     row, errors = truth[k], noise[k]
     omega = row.imu_omega_b_rad_s

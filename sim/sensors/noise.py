@@ -7,7 +7,7 @@ other source, and switching one error off changes no other.
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from estimator.interface import Array
 from estimator.jit import kernel
 
 STANDARD_GRAVITY_M_S2: Final = 9.80665  # what a data sheet means by 1 g
-REFERENCE_RATE_HZ: Final = 50.0  # sample rate for which white noise is given
 MOST_BITS: Final = 24
+MOST_CONVERSIONS: Final = 1000
 
+Output = Literal["digital", "ratiometric", "absolute"]
 Source = Callable[[str], np.random.Generator]  # name of a source -> its own generator
 
 
@@ -46,9 +47,26 @@ def require_converter(params: Any, unit: str, name: str) -> None:
         raise ValueError(f"{owner}.{name} = {full_scale!r} {unit}: choose a number above 0, finite unless bits is 0")
 
 
-def sample_sigma(sigma_at_50_hz: float, imu_hz: float) -> float:
-    """Sigma of a sample at `imu_hz`: white noise of one density grows with the root of the sample rate."""
-    return sigma_at_50_hz * math.sqrt(imu_hz / REFERENCE_RATE_HZ)
+def require_device(params: Any) -> None:
+    """Refuse a bandwidth, a number of conversions or a kind of output that no part has: ValueError."""
+    owner = type(params).__name__
+    if not params.bandwidth_hz > 0.0:
+        raise ValueError(f"{owner}.bandwidth_hz = {params.bandwidth_hz!r} Hz: choose a number above 0, or infinity")
+    if params.conversions not in range(MOST_CONVERSIONS + 1):
+        raise ValueError(
+            f"{owner}.conversions = {params.conversions!r} per sample: choose a whole number from 1 to "
+            f"{MOST_CONVERSIONS}, or 0 for a continuous mean"
+        )
+    if params.output not in get_args(Output):
+        raise ValueError(f"{owner}.output = {params.output!r}: choose {', '.join(get_args(Output))}")
+
+
+def sample_sigma(density_sqrt_hz: float, imu_hz: float) -> float:
+    """Sigma of the mean over 1 / `imu_hz` of white noise with a one-sided spectral density, in its unit per root Hz.
+
+    The power of the mean over a time dt is that of a bandwidth of 1 / (2 dt).
+    """
+    return density_sqrt_hz * math.sqrt(imu_hz / 2.0)
 
 
 def random_walk(steps: Array, sigma_per_sqrt_s: float, dt_s: float) -> Array:

@@ -1,4 +1,4 @@
-"""The sensors of one aeroplane: gyro, accelerometer and GPS, measured together by one kernel per tick.
+"""The sensors of one aeroplane, measured together by one kernel per tick.
 
 Row k of the measured log is filled from the truth of rows up to k alone.
 """
@@ -16,19 +16,27 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log
 from sim.rng import stream
-from sim.sensors import accelerometer, gps, gyro
+from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer
 from sim.sensors.accelerometer import AccelerometerParams, measure_force
+from sim.sensors.air_data import AirspeedParams, BarometerParams, measure_air
+from sim.sensors.board import BoardParams
+from sim.sensors.faults import FAULT, spoil
 from sim.sensors.gps import GpsParams, receive
 from sim.sensors.gyro import GyroParams, measure_rate
+from sim.sensors.magnetometer import MagnetometerParams, measure_field
 
 
 @dataclass(frozen=True, slots=True)
 class SuiteParams:
-    """What is fitted, and how good each part is."""
+    """What is fitted, and how good each part is; None is not fitted."""
 
     gyro: GyroParams = field(default_factory=GyroParams)
     accelerometer: AccelerometerParams = field(default_factory=AccelerometerParams)
     gps: GpsParams = field(default_factory=GpsParams)
+    magnetometer: MagnetometerParams | None = None
+    airspeed: AirspeedParams | None = None
+    barometer: BarometerParams | None = None
+    board: BoardParams = field(default_factory=BoardParams)
 
 
 _INF = float("inf")
@@ -38,34 +46,53 @@ SUITES = MappingProxyType(
         "generic": SuiteParams(),
         "generic_6g": SuiteParams(accelerometer=AccelerometerParams(range_g=6.0)),
         "ideal": SuiteParams(
-            GyroParams(0.0, 0.0, 0.0, 0.0, gain=0.0, cross_axis=0.0, range_deg_s=_INF, bits=0),
-            AccelerometerParams(0.0, 0.0, range_g=_INF, bits=0),
-            GpsParams(0.0, 0.0, 0.0, velocity_noise_m_s=0.0, wander_horizontal_m=0.0, wander_vertical_m=0.0),
+            GyroParams(
+                bias_deg_s=0.0, drift_deg_s_min=0.0, walk_deg_s_sqrt_s=0.0, noise_density_deg_s_sqrt_hz=0.0,
+                gain=0.0, cross_axis=0.0, range_deg_s=_INF, bits=0,
+            ),
+            AccelerometerParams(bias_g=0.0, noise_density_ug_sqrt_hz=0.0, range_g=_INF, bits=0),
+            GpsParams(
+                filter_s=0.0, latency_s=0.0, first_fix_s=0.0, velocity_noise_m_s=0.0,
+                wander_horizontal_m=0.0, wander_vertical_m=0.0,
+            ),
         ),
     }
-)
+)  # fmt: skip
 
 UNIT = np.dtype(
-    [("dt_s", "f8"), ("gyro", gyro.UNIT), ("accelerometer", accelerometer.UNIT), ("gps", gps.UNIT)],
+    [
+        ("dt_s", "f8"),
+        ("board", board.UNIT),
+        ("gyro", gyro.UNIT),
+        ("accelerometer", accelerometer.UNIT),
+        ("gps", gps.UNIT),
+        ("magnetometer", magnetometer.UNIT),
+        ("air", air_data.UNIT),
+    ],
     align=True,
 )
-NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE], align=True)
+NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.NOISE, *air_data.NOISE], align=True)
+MEMORY = np.dtype([("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY)], align=True)
 
 
 class Snapshot(NamedTuple):
-    """All that makes these sensors these: the units fitted and the errors drawn; the past is in the log."""
+    """All that makes these sensors these: the units fitted, the errors drawn, the memory; the rest is in the log."""
 
     unit: NDArray[np.void]
     noise: NDArray[np.void]
+    memory: NDArray[np.void]
+    faults: NDArray[np.void]
 
 
 class Suite:
-    """The sensors of flight number `flight` of the campaign `seed`.
+    """The sensors of flight number `flight` of the campaign `seed`, with `faults`, shape (n,) of FAULT.
 
-    Its errors are drawn in `reset`; its only memory are the earlier rows of the log.
+    Its errors are drawn in `reset`.  Filters remember in one record what rows of the log cannot tell.
     """
 
-    def __init__(self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0) -> None:
+    def __init__(
+        self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: NDArray[np.void] | None = None
+    ) -> None:
         self.params = params
         self.rates = rates
         self._source = partial(stream, seed, flight)
@@ -73,21 +100,31 @@ class Suite:
         self._measured = self._seen = np.zeros(0, MEASURED_DTYPE)
         self._noise = np.zeros(0, NOISE)
         self._unit = np.zeros(1, UNIT)
+        self._memory = np.zeros(1, MEMORY)
+        self._faults = np.zeros(0, FAULT) if faults is None else faults
 
     def reset(self, log: Log) -> None:
         """Power up: draw the errors of a flight as long as `log`, whose rows `measure` fills from 0 on."""
         self._truth, self._measured = log.truth, log.measured
         self._seen = log.measured.view()
         self._seen.flags.writeable = False
+        p, rates, source = self.params, self.rates, self._source
         unit, noise = np.zeros(1, UNIT), np.zeros(len(log), NOISE)
-        gyro.make(self.params.gyro, self._source, unit["gyro"])
-        accelerometer.make(self.params.accelerometer, unit["accelerometer"])
-        gps.make(self.params.gps, self.rates, unit["gps"])
-        gyro.draw(self.params.gyro, self.rates, self._source, noise)
-        accelerometer.draw(self.params.accelerometer, self.rates, self._source, noise)
-        gps.draw(self.params.gps, self.rates, self._source, noise)
-        unit["dt_s"] = self.rates.dt_s
-        self._unit, self._noise = unit, noise
+        unit["dt_s"] = rates.dt_s
+        board.make(p.board, unit["board"])
+        gyro.make(p.gyro, p.board, rates, source, unit["gyro"])
+        gyro.draw(p.gyro, p.board, rates, source, noise)
+        accelerometer.make(p.accelerometer, p.board, rates, source, unit["accelerometer"])
+        accelerometer.draw(p.accelerometer, p.board, rates, source, noise)
+        gps.make(p.gps, rates, unit["gps"])
+        gps.draw(p.gps, rates, source, noise)
+        if p.magnetometer is not None:
+            magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"])
+            magnetometer.draw(p.magnetometer, rates, source, noise)
+        if p.airspeed is not None or p.barometer is not None:
+            air_data.make(p.airspeed, p.barometer, rates, source, unit["air"])
+            air_data.draw(p.airspeed, p.barometer, rates, source, noise)
+        self._unit, self._noise, self._memory = unit, noise, np.zeros(1, MEMORY)
 
     def measure(self, k: int) -> Measurements:
         """Measure tick `k`, whose truth row is complete; a read-only view of its row.
@@ -96,12 +133,12 @@ class Suite:
         ------
         IndexError      the log has no row `k`, or there is no log yet
         """
-        _measure(self._truth, self._measured, self._noise, k, self._unit)
+        _measure(self._truth, self._measured, self._noise, k, self._unit, self._memory, self._faults)
         return tuple.__new__(Measurements, (self._seen, k))  # spares the constructor's Python: 0.15 us
 
     def snapshot(self) -> Snapshot:
-        """What `restore` needs to go on; neither array is ever changed after `reset`."""
-        return Snapshot(self._unit, self._noise)
+        """What `restore` needs to go on; none of its arrays is changed later."""
+        return Snapshot(self._unit, self._noise, self._memory.copy(), self._faults)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Be the sensors of `snapshot` from the next tick on; call `reset` with the log first."""
@@ -110,15 +147,23 @@ class Suite:
                 f"snapshot of {len(snapshot.noise)} ticks: the log has {len(self._truth)} ticks; "
                 "choose one taken in a flight at least as long"
             )
-        self._unit, self._noise = snapshot
+        self._unit, self._noise, self._faults = snapshot.unit, snapshot.noise, snapshot.faults
+        self._memory = snapshot.memory.copy()
 
 
 @kernel
-def _measure(truth, measured, noise, k, unit):  # type: ignore[no-untyped-def]
+def _measure(truth, measured, noise, k, unit, memory, faults):  # type: ignore[no-untyped-def]
     if k < 0 or k >= min(len(measured), len(noise)):
         raise IndexError("the log has no such row: call reset(log) with a log as long as the flight")
+    u, m = unit[0], memory[0]
     measured[k].t_s = truth[k].t_s
-    measured[k].dt_s = unit[0].dt_s
-    measure_rate(truth, measured, noise, k, unit[0].gyro)
-    measure_force(truth, measured, noise, k, unit[0].accelerometer)
-    receive(truth, measured, noise, k, unit[0].gps)
+    measured[k].dt_s = u.dt_s
+    measure_rate(truth, measured, noise, k, u.gyro, m.gyro)
+    measure_force(truth, measured, noise, k, u.accelerometer, u.board, m.accelerometer)
+    receive(truth, measured, noise, k, u.gps)
+    if u.magnetometer.fitted:
+        measure_field(truth, measured, noise, k, u.magnetometer)
+    if u.air.fitted:
+        measure_air(truth, measured, noise, k, u.air)
+    if len(faults):
+        spoil(truth, measured, k, faults)

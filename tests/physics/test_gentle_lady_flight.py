@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from autopilot.interface import ActuatorCommand
 from sim.air import STILL
-from sim.jsbsim_model import FT_TO_M, LATITUDE_DEG, Model
+from sim.jsbsim_model import FT_TO_M, Model
+from sim.place import LATITUDE_DEG
 from sim.truth import gravity_m_s2
 
 HEIGHT_M = 60.0

@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 from autopilot.interface import NEUTRAL, ActuatorCommand
 from sim.air import Air
 from sim.clock import Rates
-from sim.jsbsim_model import LATITUDE_DEG, Model
+from sim.jsbsim_model import Model
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Log, Outcome, Phase
+from sim.place import LATITUDE_DEG
 from sim.plant import HandThrow, InFlight, SimulationDiverged
 from sim.truth import gravity_m_s2
 

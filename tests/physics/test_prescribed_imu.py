@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from sim.clock import Rates
+from sim.place import LATITUDE_DEG
 from sim.prescribed_plant import (
-    LATITUDE_DEG,
     Coning,
     HandHeld,
     Loop,

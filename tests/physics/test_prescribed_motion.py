@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 from autopilot.interface import NEUTRAL, ActuatorCommand
 from sim.clock import Rates
 from sim.log import Log
+from sim.place import LATITUDE_DEG
 from sim.prescribed_plant import (
     GRAVITY_M_S2,
-    LATITUDE_DEG,
     Coning,
     FreeFall,
     HandHeld,

@@ -15,10 +15,10 @@ from sim.sensors.suite import SUITES, Suite, SuiteParams
 DEG = math.pi / 180.0
 G0 = 9.80665
 NO_GYRO_ERROR = {
-    "bias_deg_s": 0.0, "drift_deg_s_min": 0.0, "walk_deg_s_sqrt_s": 0.0, "noise_deg_s": 0.0, "gain": 0.0,
-    "cross_axis": 0.0, "range_deg_s": math.inf, "bits": 0,
+    "bias_deg_s": 0.0, "drift_deg_s_min": 0.0, "walk_deg_s_sqrt_s": 0.0, "noise_density_deg_s_sqrt_hz": 0.0,
+    "gain": 0.0, "cross_axis": 0.0, "range_deg_s": math.inf, "bits": 0,
 }  # fmt: skip
-NO_FORCE_ERROR = {"bias_g": 0.0, "noise_g": 0.0, "range_g": math.inf, "bits": 0}
+NO_FORCE_ERROR = {"bias_g": 0.0, "noise_density_ug_sqrt_hz": 0.0, "range_g": math.inf, "bits": 0}
 DOUBTED_ONCE_IN = 1e-5
 
 
@@ -86,7 +86,7 @@ def test_gyro_random_walk_grows_with_the_root_of_time():
 @pytest.mark.parametrize(("imu_hz", "sigma_deg_s"), [(50, 0.3), (100, 0.3 * math.sqrt(2)), (200, 0.6)])
 def test_gyro_noise_has_its_sigma_at_every_rate(imu_hz, sigma_deg_s):
     """0.3 deg/s a sample at 50 Hz, growing with the root of the rate; white: neighbours do not correlate."""
-    reading = flights(4, 2000, imu_hz, noise_deg_s=0.3)
+    reading = flights(4, 2000, imu_hz, noise_density_deg_s_sqrt_hz=0.06)
     assert_sigma(reading, sigma_deg_s)
     together = np.sum(reading[:, 1:] * reading[:, :-1]) / sigma_deg_s**2
     assert abs(together) <= 4.5 * math.sqrt(reading[:, 1:].size)
@@ -144,14 +144,14 @@ def test_accelerometer_bias_has_its_sigma_and_stays():
 @pytest.mark.parametrize(("imu_hz", "sigma_g"), [(50, 0.02), (200, 0.04)])
 def test_accelerometer_noise_has_its_sigma_at_every_rate(imu_hz, sigma_g):
     """0.02 g a sample at 50 Hz, growing with the root of the rate."""
-    assert_sigma(force_flights(4, 2000, imu_hz, noise_g=0.02), sigma_g)
+    assert_sigma(force_flights(4, 2000, imu_hz, noise_density_ug_sqrt_hz=4000.0), sigma_g)
 
 
 def test_inertial_bias_in_the_truth_is_the_additive_error():
     """With nothing but bias, drift and walk, reading minus truth is the bias column of the truth."""
     rates = Rates()
-    gyro = GyroParams(noise_deg_s=0.0, gain=0.0, cross_axis=0.0, range_deg_s=math.inf, bits=0)
-    force = AccelerometerParams(noise_g=0.0, range_g=math.inf, bits=0)
+    gyro = GyroParams(noise_density_deg_s_sqrt_hz=0.0, gain=0.0, cross_axis=0.0, range_deg_s=math.inf, bits=0)
+    force = AccelerometerParams(noise_density_ug_sqrt_hz=0.0, range_g=math.inf, bits=0)
     log = log_of(300, rates, (0.1, -0.2, 0.3))
     rows = measured(SuiteParams(gyro, force), log, rates, seed=4)
     for reading, imu, bias in (
@@ -165,7 +165,12 @@ def test_inertial_bias_in_the_truth_is_the_additive_error():
 def test_generic_suite_has_the_data_sheet_of_the_reference_set_up():
     """The default sensors, number by number: campaigns that name `generic` depend on them."""
     generic = SUITES["generic"]
-    assert generic.gyro == GyroParams(1.0, 0.2, 0.01, 0.3, 0.015, 0.005, 300.0, 10)
-    assert generic.accelerometer == AccelerometerParams(0.02, 0.02, 3.0, 10)
+    assert generic.gyro == GyroParams(
+        bias_deg_s=1.0, drift_deg_s_min=0.2, walk_deg_s_sqrt_s=0.01, noise_density_deg_s_sqrt_hz=0.06, gain=0.015,
+        cross_axis=0.005, range_deg_s=300.0, bits=10,
+    )  # fmt: skip
+    assert generic.accelerometer == AccelerometerParams(
+        bias_g=0.02, noise_density_ug_sqrt_hz=4000.0, range_g=3.0, bits=10
+    )
     assert (generic.gps.filter_s, generic.gps.latency_s, generic.gps.velocity_noise_m_s) == (1.0, 0.3, 0.1)
     assert SUITES["generic_6g"].accelerometer.range_g == 6.0

@@ -46,10 +46,10 @@ def test_convert_without_bits_only_clips(x):
     assert convert(x, 0.0, math.inf) == x
 
 
-def test_sample_sigma_grows_with_the_root_of_the_rate():
-    """One noise density: four times the rate, twice the sigma; the figure itself is for 50 Hz."""
-    assert sample_sigma(0.3, 50) == 0.3
-    np.testing.assert_allclose(sample_sigma(0.3, 200), 0.6, rtol=0, atol=1e-15)
+def test_sample_sigma_is_the_density_times_the_root_of_half_the_rate():
+    """One-sided density over the bandwidth of half the sample rate: 0.06 per root Hz is 0.3 at 50 Hz, 0.6 at 200."""
+    assert sample_sigma(0.06, 50) == pytest.approx(0.3, rel=0, abs=1e-15)
+    assert sample_sigma(0.06, 200) == pytest.approx(0.6, rel=0, abs=1e-15)
 
 
 def test_random_walk_grows_with_the_root_of_time():
