@@ -1,0 +1,106 @@
+"""Reference vectors: synthetic sensor input (``*_in.csv.gz``), and an attitude for each of its rows to compare with.
+
+The input has a row per inertial sample in SI units, earth north-east-down, body forward-right-down: time of the end
+of the interval, its length, mean rate and specific force, GPS velocity and position where a fix arrived, magnetic
+field in counts where a sample arrived, airspeed.  The attitudes (``*_truth``, or what the original firmware printed)
+are the nine elements of the body-to-earth rotation, row by row.
+"""
+
+import csv
+import gzip
+import io
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import MEASURED_DTYPE, Array
+from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+
+COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
+LEAST_FIX = 3  # a fix of three dimensions
+INPUT = ("t", "dt", "gx", "gy", "gz", "ax", "ay", "az", "gps_new", "gps_vn", "gps_ve", "gps_vd", "gps_fix",
+         "mag_new", "mx", "my", "mz", "airspeed", "gps_n", "gps_e", "gps_d")  # fmt: skip
+ATTITUDE = ("t", *(f"r{i}{j}" for i in range(3) for j in range(3)))
+
+
+def is_reference(path: Path) -> bool:
+    """Whether the file at `path` has the name of an input of reference vectors."""
+    return path.name.endswith(("_in.csv.gz", "_in.csv"))
+
+
+def read(path: Path, reference: Path | None = None) -> RecordedLog:
+    """The input at `path`, with the attitudes of the file `reference`; without, the ``*_truth`` beside it, if any.
+
+    Raises
+    ------
+    LogError      a file that cannot be read, lacks a column, or belongs to another input
+    """
+    table = _table(path, INPUT)
+    n = len(table["t"])
+    rows = np.zeros(n, MEASURED_DTYPE)
+    rows["t_s"], rows["dt_s"] = table["t"], table["dt"]
+    rows["gyro_b_rad_s"] = _vector(table, "gx", "gy", "gz")
+    rows["force_b_m_s2"] = _vector(table, "ax", "ay", "az")
+    fixes = (table["gps_new"] > 0.0) & (table["gps_fix"] >= LEAST_FIX)
+    velocity, last = _held(_vector(table, "gps_vn", "gps_ve", "gps_vd"), fixes)
+    rows["gps_new"], rows["gps_valid"] = fixes, last >= 0
+    rows["gps_v_e_m_s"] = velocity
+    rows["gps_p_e_m"], _ = _held(_vector(table, "gps_n", "gps_e", "gps_d"), fixes)
+    rows["gps_t_s"] = np.where(last >= 0, table["t"][last], 0.0)
+    rows["gps_speed_m_s"] = np.hypot(velocity[:, 0], velocity[:, 1])
+    rows["gps_course_rad"] = np.arctan2(velocity[:, 1], velocity[:, 0]) % (2.0 * np.pi)
+    rows["mag_new"] = table["mag_new"] > 0.0
+    rows["mag_b_ut"], _ = _held(COUNT_UT * _vector(table, "mx", "my", "mz"), rows["mag_new"] > 0)
+    flown_through_air = bool(np.any(table["airspeed"] != 0.0))
+    rows["air_new"], rows["airspeed_m_s"] = flown_through_air, table["airspeed"]
+    rows["baro_height_m"] = np.nan
+    instruments = ["gyro", "accelerometer"]
+    instruments += [name for name, has in (("gps", fixes), ("magnetometer", rows["mag_new"])) if np.any(has)]
+    instruments += ["airspeed"] if flown_through_air else []
+    return RecordedLog(rows, path.name, tuple(instruments), _reference(path, reference, table["t"]))
+
+
+def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | None:
+    if reference is None:
+        reference = path.with_name(path.name.replace("_in.csv", "_truth.csv"))
+        if not reference.is_file():
+            return None
+    table = _table(reference, ATTITUDE)
+    if len(table["t"]) != len(t_s) or np.abs(table["t"] - t_s).max() > 5e-4:  # times are printed to the millisecond
+        raise LogError(f"{reference}: {len(table['t'])} rows at other times than the {len(t_s)} of {path.name}")
+    R_eb = np.stack([table[name] for name in ATTITUDE[1:]], axis=-1).reshape(-1, 3, 3)
+    kind: Literal["truth", "firmware"] = "truth" if "_truth." in reference.name else "firmware"
+    return Reference(R_eb, kind, reference.name.partition(".csv")[0])
+
+
+def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
+    """Columns of a file of comma-separated numbers, packed or not."""
+    try:
+        raw = path.read_bytes()
+        text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode()
+    except (OSError, EOFError, UnicodeDecodeError) as error:
+        raise LogError(f"{path}: cannot be read: {error}") from error
+    lines = csv.reader(io.StringIO(text))
+    header = next(lines, [])
+    missing = [name for name in wanted if name not in header]
+    if missing:
+        raise LogError(f"{path}: no column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
+    try:
+        values = np.array([[float(cell) for cell in line] for line in lines], dtype=float)
+    except ValueError as error:
+        raise LogError(f"{path}: row {lines.line_num}: {error}") from error
+    if values.ndim != 2 or values.shape[1] != len(header):
+        raise LogError(f"{path}: {len(values)} rows; each must have the {len(header)} numbers of the header")
+    return {name: values[:, header.index(name)] for name in wanted}
+
+
+def _vector(table: dict[str, Array], *names: str) -> Array:
+    return np.stack([table[name] for name in names], axis=-1)
+
+
+def _held(values: Array, new: NDArray[np.bool_]) -> tuple[Array, NDArray[np.intp]]:
+    """`values` where `new`, held until the next, zero before the first; and the row each comes from, -1 for none."""
+    last = np.maximum.accumulate(np.where(new, np.arange(len(values)), -1))
+    return np.where(last[:, None] >= 0, values[last], 0.0), last
