@@ -146,8 +146,9 @@ def measure_rate(truth, measured, noise, k, unit, board, memory, state):  # type
 def feel_rate(truth, k, unit, board, memory, state):  # type: ignore[no-untyped-def]
     """Mean over tick k of the rate behind the low-pass filter, vibration included, into `memory.signal`.
 
-    The rate in a tick is the parabola through its mean and its values at both ends.  At power-up the filter has
-    settled on the first rate.
+    The rate in a tick is the parabola with its mean and its values at both ends; the means behind the filter err by
+    at most h^4 / 720 times the largest fourth derivative, to the next power of the tick h, whatever the bandwidth.
+    At power-up the filter has settled on the first rate.
     """
     for i in range(3):
         mean = truth[k].imu_omega_b_rad_s[i]
