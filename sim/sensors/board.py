@@ -92,7 +92,8 @@ def make(params: BoardParams, rates: Rates, source: Source, unit: NDArray[np.voi
     """Make one board: draw its supply and set its constants in `unit`, shape (1,) of UNIT."""
     unit["dt_s"] = rates.dt_s
     unit["lever_arm_b_m"] = params.lever_arm_b_m
-    unit["supply"] = 1.0 + params.supply_tolerance * source("board supply").standard_normal()
+    wrong = params.supply_tolerance * source("board supply").standard_normal() if params.supply_tolerance else 0.0
+    unit["supply"] = 1.0 + wrong
     for name in ("supply_sag", "warming_k", "warming_s"):
         unit[name] = getattr(params, name)
     unit["shaken_at_hz"] = params.vibration_rpm / 60.0

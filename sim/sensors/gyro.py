@@ -99,9 +99,10 @@ def make(params: GyroParams, board: BoardParams, rates: Rates, source: Source, u
         null=math.radians(params.null_deg_s), shake=math.radians(board.vibration_deg_s),
         density_sqrt_hz=math.radians(params.noise_density_deg_s_sqrt_hz),
     )  # fmt: skip
-    sensitivity = math.radians(params.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2
-    G = sensitivity * source("gyro g-sensitivity").standard_normal((3, 3))
-    unit["leans"], unit["g_sensitivity"] = params.g_sensitivity_deg_s_g > 0.0, G @ device.axes(board.mounting_deg)
+    if params.g_sensitivity_deg_s_g:
+        sigma = math.radians(params.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2
+        G = sigma * source("gyro g-sensitivity").standard_normal((3, 3))
+        unit["leans"], unit["g_sensitivity"] = 1, G @ device.axes(board.mounting_deg)
 
 
 def draw(params: GyroParams, board: BoardParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
