@@ -57,8 +57,8 @@ def receive(truth, measured, noise, k, unit, memory):  # type: ignore[no-untyped
     step = ((k + 1) * spt - unit.latency_steps) // spf * spf
     if step + unit.latency_steps > k * spt and step >= max(unit.first_fix_step, spf):
         at = (step + spt - 1) // spt - 1  # the row of the tick that `step` lies in
-        if not noise[at].satellites_lost:
-            _report(truth, measured[k], noise, step, at, unit, memory)
+        if not noise[at].satellites_lost and not _report(truth, measured[k], noise, step, at, unit, memory):
+            _hold(measured[k - 1], measured[k])
 
 
 @kernel
@@ -89,25 +89,23 @@ def _hold(last, row):  # type: ignore[no-untyped-def]
 
 @kernel
 def _report(truth, row, noise, step, at, unit, memory):  # type: ignore[no-untyped-def]
-    """Report what was inside the receiver at `step`, which lies in the tick whose row is `at`."""
+    """Report what was inside the receiver at `step`, which lies in the tick whose row is `at`; False: no fix yet."""
     late = (step - at * unit.steps_per_tick) / unit.steps_per_tick  # share of that tick gone by, 0 < late <= 1
     newer, older, error = truth[at], truth[max(at - 1, 0)], noise[at]
-    p, v = np.empty(3), np.empty(3)
+    p, v = row.gps_p_e_m, row.gps_v_e_m_s
     for i in range(3):
         p[i] = (1.0 - late) * older.gps_p_e_m[i] + late * newer.gps_p_e_m[i] + error.gps_p_wander_e_m[i]
         v[i] = (1.0 - late) * older.gps_v_e_m_s[i] + late * newer.gps_v_e_m_s[i] + error.gps_v_noise_e_m_s[i]
     if unit.plain:
-        course_rad, speed_m_s = _course(v), np.sqrt(v[0] * v[0] + v[1] * v[1])
+        row.gps_course_rad, row.gps_speed_m_s = _course(v), np.sqrt(v[0] * v[0] + v[1] * v[1])
     else:
-        course_rad, speed_m_s = _process(p, v, step, unit, memory)
+        row.gps_course_rad, row.gps_speed_m_s = _process(p, v, step, unit, memory)
         if unit.from_positions and memory.fixes < 3:
-            return
-    for i in range(3):
-        row.gps_p_e_m[i], row.gps_v_e_m_s[i] = p[i], v[i]
-    row.gps_course_rad, row.gps_speed_m_s = course_rad, speed_m_s
+            return False
     row.gps_t_s = step / unit.physics_hz
     row.gps_new = 1
     row.gps_valid = 1
+    return True
 
 
 @kernel
