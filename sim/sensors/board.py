@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.interface import Array
 from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors.noise import Output, Source, require
@@ -63,6 +64,14 @@ class BoardParams:
         return (output == "ratiometric") - self.converter_ratiometric
 
 
+def warming(params: BoardParams, t_s: Array) -> Array:
+    """How much warmer than at power-up the parts are `t_s` later, K: a body that takes up a constant power.
+
+    Newton's law of cooling: dT/dt = (warming_k - T) / warming_s, T(0) = 0.
+    """
+    return -params.warming_k * np.expm1(-t_s / params.warming_s)
+
+
 UNIT = np.dtype(
     [
         ("changes", "i8"),  # whether anything here differs from tick to tick
@@ -114,7 +123,7 @@ def attend(truth, k, unit, memory):  # type: ignore[no-untyped-def]
     The rotor's speed in the tick is the mean of those at its ends.
     """
     row = truth[k]
-    memory.warmer_k = -unit.warming_k * np.expm1(-row.t_s / unit.warming_s)
+    memory.warmer_k = -unit.warming_k * np.expm1(-row.t_s / unit.warming_s)  # as `warming`
     memory.supply = unit.supply - unit.supply_sag * row.throttle
     rpm = 0.5 * (row.rotor_rpm + truth[k - 1].rotor_rpm) if k > 0 else row.rotor_rpm
     memory.rotor_hz = rpm / 60.0
