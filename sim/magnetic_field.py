@@ -1,6 +1,6 @@
 """The earth's magnetic field at a place and a date: the World Magnetic Model.
 
-NOAA and BGS, "The US/UK World Magnetic Model for 2025-2030", 2024: a spherical harmonic expansion of degree 12
+NOAA and BGS, "The US/UK World Magnetic Model for 2025-2030" (WMM2025): a spherical harmonic expansion of degree 12
 with a linear change in time.  It knows the core's field alone; rocks and steel nearby add their own.
 """
 
