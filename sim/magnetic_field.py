@@ -19,7 +19,7 @@ def require_year(owner: str, year: float) -> None:
     """Refuse a date that the model does not cover: ValueError."""
     if not FIRST_YEAR <= year <= LAST_YEAR:
         raise ValueError(
-            f"{owner} = {year!r} (decimal): choose {FIRST_YEAR:g} to {LAST_YEAR:g}, which the world magnetic model covers"
+            f"{owner} = {year!r} (decimal): choose {FIRST_YEAR:g} to {LAST_YEAR:g}, the world magnetic model's years"
         )
 
 
