@@ -183,19 +183,20 @@ class _Group(NamedTuple):
 def _groups(sentences: list[_Sentence], problems: list[Problem]) -> list[_Group]:
     """Sentences by their time; those that have none by nature (VTG) belong to the one before."""
     groups: list[_Group] = []
+    current: _Group | None = None
     for sentence in sentences:
-        if sentence.name == "VTG":
-            if groups:
-                groups[-1].sentences.append(sentence)
-            continue
-        clock = sentence.message.time
-        if not isinstance(clock, time):
-            problems.append(Problem("no time", sentence.where, f"{sentence.name} without a time"))
-            continue
-        ns = ((clock.hour * 60 + clock.minute) * 60 + clock.second) * NS + clock.microsecond * 1000
-        if not groups or groups[-1].clock_ns != ns:
-            groups.append(_Group(ns, []))
-        groups[-1].sentences.append(sentence)
+        if sentence.name != "VTG":
+            clock = sentence.message.time
+            if not isinstance(clock, time):
+                problems.append(Problem("no time", sentence.where, f"{sentence.name} without a time"))
+                current = None
+                continue
+            ns = ((clock.hour * 60 + clock.minute) * 60 + clock.second) * NS + clock.microsecond * 1000
+            if current is None or current.clock_ns != ns:
+                current = _Group(ns, [])
+                groups.append(current)
+        if current is not None:
+            current.sentences.append(sentence)
     return groups
 
 
