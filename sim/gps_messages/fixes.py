@@ -196,12 +196,27 @@ def date_time(ns: int) -> datetime:
     return EPOCH + timedelta(microseconds=ns // 1000)
 
 
+def checked(place: Place) -> Place:
+    """`place`; ValueError where there is none such."""
+    if not (abs(place.latitude_deg) <= 90.0 and abs(place.longitude_deg) <= 180.0 and np.isfinite(place.height_m)):
+        raise ValueError(f"{place}: latitude must be -90..90 deg, longitude -180..180 deg, height a number of metres")
+    return place
+
+
 def geodetic(p_e_m: Array, place: Place) -> Array:
-    """Latitude, longitude (deg) and height (m) of positions of shape (n, 3); NaN where one is not finite."""
+    """Latitude, longitude (deg) and height (m) of positions of shape (n, 3).
+
+    Without down, NaN, the height is NaN and the rest is that of the place's own level; without north or east all are.
+    """
     there = np.full_like(p_e_m, NAN)
-    known = np.isfinite(p_e_m).all(axis=1)
+    known = np.isfinite(p_e_m[:, :2]).all(axis=1)
+    down_known = np.isfinite(p_e_m[:, 2])
     if known.any():
-        there[known] = np.transpose(pymap3d.ned2geodetic(*p_e_m[known].T, *place))
+        n_m, e_m, d_m = p_e_m[known].T
+        there[known] = np.transpose(
+            pymap3d.ned2geodetic(n_m, e_m, np.where(np.isfinite(d_m), d_m, 0.0), *checked(place))
+        )
+    there[~down_known, 2] = NAN
     return there
 
 
@@ -237,8 +252,8 @@ def assemble(
         raise ValueError(f"no GPS fix in it{_told(problems, ignored)}")
     times = sorted(kept)
     ordered = [kept[ns] for ns in times]
-    place = place or _place(ordered)
-    start = start or date_time(times[0])
+    place = _place(ordered) if place is None else checked(place)
+    start = date_time(times[0]) if start is None else start
     return Reading(_fixes(times, ordered, place, utc_ns(start)), place, start, ignored, tuple(problems))
 
 

@@ -62,7 +62,9 @@ def read_nmea(file: str | Path, place: Place | None = None, start: datetime | No
 
 
 def encode_nmea(fixes: Fixes, place: Place = LAUNCH, start: datetime = START, talker: str = "GN") -> bytes:
-    """GGA, RMC and VTG of every fix, in the order of `fixes`; one that is not finite as a sentence without a fix.
+    """GGA, RMC and VTG of every fix, in the order of `fixes`.
+
+    A time, a height, a speed or a course that is not known is an empty field; without time or place there is no fix.
 
     place : origin of the positions      start : UTC at which `t_s` is zero      talker : who speaks, two letters
 
@@ -71,6 +73,8 @@ def encode_nmea(fixes: Fixes, place: Place = LAUNCH, start: datetime = START, ta
     ValueError      pynmeagps is not installed, or a date that cannot be written
     """
     nmea = needed("pynmeagps")
+    if not re.fullmatch("[A-Z]{2}", talker):
+        raise ValueError(f"talker {talker!r}: must be two capital letters, for instance GN")
     there = geodetic(fixes.p_e_m, place)
     sentences = []
     for i, ns in enumerate(stamps_ns(fixes, start)):
@@ -101,9 +105,9 @@ def decode_nmea(data: bytes, place: Place | None = None, start: datetime | None 
 def _payloads(fixes: Fixes, i: int, ns: int | None, there: list[float]) -> Iterator[tuple[str, list[str]]]:
     """Name and fields of the three sentences of fix `i`."""
     clock, day = _clock(ns)
-    good = ns is not None and all(math.isfinite(x) for x in there)
+    good = ns is not None and math.isfinite(there[0])
     position = [*_angle(there[0], 2, "NS"), *_angle(there[1], 3, "EW")] if good else [""] * 4
-    height = f"{round(there[2], 3) + 0.0:.3f}" if good else ""  # never -0.000
+    height = f"{round(there[2], 3) + 0.0:.3f}" if good and math.isfinite(there[2]) else ""  # never -0.000
     speed, course = float(fixes.speed_m_s[i]), float(fixes.course_rad[i])
     known = good and math.isfinite(speed) and math.isfinite(course)
     knots = f"{speed / KNOT_M_S:.3f}" if known else ""

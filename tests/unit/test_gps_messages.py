@@ -349,6 +349,32 @@ def test_nmea_leaves_out_a_motion_that_is_not_known_and_ubx_the_fix() -> None:
     assert reading.count("no fix") == 1
 
 
+def test_height_that_is_not_known_is_an_empty_field_and_comes_back_unknown() -> None:
+    """A file of RMC alone can be written again: NMEA without a height, and NAV-PVT without a fix."""
+    fixes = decode_nmea(rmc("120000"), place=Place(48.0, 11.5, 500.0)).fixes
+    back = decode_nmea(encode_nmea(fixes, Place(48.0, 11.5, 500.0)), Place(48.0, 11.5, 500.0))
+    assert back.count("no height") == 1
+    # Written at the level of the place and read at its height, 17 m apart at 13 km: 17 m / 6.4e6 m of 13 km is 35 mm.
+    np.testing.assert_allclose(back.fixes.p_e_m[0, :2], fixes.p_e_m[0, :2], rtol=0, atol=0.04)
+    assert np.isnan(back.fixes.p_e_m[0, 2])
+    with pytest.raises(ValueError, match=r"found: no fix 1"):
+        decode_ubx(encode_ubx(fixes))
+
+
+@pytest.mark.parametrize("place", [Place(91.0, 0.0, 0.0), Place(0.0, -181.0, 0.0), Place(0.0, 0.0, np.nan)])
+def test_place_that_does_not_exist_is_refused(place: Place) -> None:
+    """Writing and reading alike."""
+    for call in (lambda: encode_nmea(one(), place), lambda: encode_ubx(one(), place), lambda: decode_ubx(FIRST, place)):
+        with pytest.raises(ValueError, match=r"latitude must be -90..90 deg"):
+            call()
+
+
+def test_talker_that_no_receiver_is_is_refused() -> None:
+    """Two capital letters, or the sentences would not be read again."""
+    with pytest.raises(ValueError, match="talker 'gps': must be two capital letters"):
+        encode_nmea(one(), talker="gps")
+
+
 def test_unknown_accuracy_comes_back_unknown() -> None:
     """NaN is the largest number of the field, not a number that a reader would trust."""
     fixes = fixes_of([1.0], [[0.0, 0.0, 0.0]], [[1.0, 2.0, 3.0]], Accuracy())
