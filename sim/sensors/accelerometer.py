@@ -1,6 +1,6 @@
 """Accelerometer: bias, noise, saturation and quantisation on the specific force at the centre of gravity.
 
-reading = convert(f + bias(t) + noise)
+reading = convert(supply(curve(M f) + bias(t) + noise)),   M = (1 + diag(gain) + cross-axis) R_sb
 bias(t) = turn-on + slope x warming(t) + flicker noise + random walk
 
 `f` is acceleration minus gravity, mean over the tick: level at rest (0, 0, -g).

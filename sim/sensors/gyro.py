@@ -1,6 +1,6 @@
 """Rate gyro: turn-on bias, drift, random walk, noise, gain and cross-axis errors, saturation, quantisation.
 
-reading = convert(M omega + bias(t) + noise),   M = 1 + diag(gain) + cross-axis,
+reading = convert(supply(curve(M omega + G f) + bias(t) + noise)),   M = (1 + diag(gain) + cross-axis) R_sb,
 bias(t) = turn-on + drift t + slope x warming(t) + flicker noise + random walk
 
 `omega` is the mean inertial rate over the tick.  The additive part bias(t) is what an estimator can learn as
