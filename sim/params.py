@@ -53,20 +53,19 @@ def changed(params: T, changes: Mapping[str, Any], what: str) -> T:
                     the dataclass refuses
     """
     for name, value in changes.items():
-        require_known(params, name, what)
-        params = _change(params, name, value, f"{name} of {what}")
+        known = dotted_fields(params)
+        if name not in known:
+            require_fitted(params, name, what)
+            raise ValueError(f"unknown parameter {name!r} of {what}: {near_misses(name, known)}")
+        params = _change(params, name, value, name, what)
     return params
 
 
-def require_known(params: Any, name: str, what: str, also: Iterable[str] = ()) -> None:
-    """Refuse a dotted `name` that is no field of `params` (or of `also`): ValueError with what is near."""
-    known = [*dotted_fields(params), *also]
+def require_fitted(params: Any, name: str, what: str) -> None:
+    """Refuse the dotted `name` of a field of a part that `what` has not: ValueError."""
     head = name.partition(".")[0]
-    if name in known:
-        return
-    if getattr(params, head, 0) is None and _is_part(type(params), head):
+    if _is_part(type(params), head) and getattr(params, head) is None:
         raise ValueError(f"parameter {name!r} of {what}: no {head} fitted; choose sensors that have one")
-    raise ValueError(f"unknown parameter {name!r} of {what}: {near_misses(name, known)}")
 
 
 def _is_part(owner: type, name: str) -> bool:
@@ -75,15 +74,20 @@ def _is_part(owner: type, name: str) -> bool:
     return any(is_dataclass(choice) for choice in (hint, *get_args(hint)))
 
 
-def _change(params: Any, name: str, value: Any, where: str) -> Any:
-    head, _, rest = name.partition(".")
+def _change(params: Any, rest: str, value: Any, name: str, what: str) -> Any:
+    head, _, rest = rest.partition(".")
     if rest:
-        return replace(params, **{head: _change(getattr(params, head), rest, value, where)})
+        return replace(params, **{head: _change(getattr(params, head), rest, value, name, what)})
     try:
         value = typed(value, get_type_hints(type(params))[head])
     except ValueError as error:
-        raise ValueError(f"{where} = {value!r} {unit_of(head)}".rstrip() + f": {error}") from None
+        raise ValueError(f"{shown(name, value)} of {what}: {error}") from None
     return replace(params, **{head: value})
+
+
+def shown(name: str, value: Any) -> str:
+    """A field with its value and unit, as messages name it."""
+    return f"{name} = {value!r} {unit_of(name)}".rstrip()
 
 
 def typed(value: Any, hint: Any) -> Any:
@@ -135,7 +139,7 @@ def _number(value: Any, kind: type) -> Any:
 
 
 def _numbers(value: Any, hints: tuple[Any, ...]) -> Any:
-    endless = len(hints) == 2 and hints[1] is Ellipsis
+    endless = hints[-1] is Ellipsis  # tuple[float, ...]
     if not isinstance(value, list | tuple) or not (endless or len(value) == len(hints)):
         raise ValueError("must be a list of numbers" if endless else f"must be a list of {len(hints)} numbers")
-    return tuple(typed(v, hints[0] if endless else hint) for v, hint in zip(value, value if endless else hints))
+    return tuple(typed(number, hints[0]) for number in value)

@@ -20,7 +20,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, get_type_hints
 
-from sim.params import near_misses, typed, unit_of
+from sim.params import near_misses, shown, typed, unit_of
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.air_data import AirspeedParams, BarometerParams
 from sim.sensors.gps import GpsParams
@@ -42,8 +42,8 @@ GENERIC: Final[Mapping[str, Any]] = MappingProxyType(
 """Parts of every kind with the defaults of their dataclass."""
 
 PERFECT: Final[Mapping[str, Any]] = MappingProxyType(
-    GENERIC
-    | {
+    {
+        **GENERIC,
         "gyro": GyroParams(
             bias_deg_s=0.0, drift_deg_s_min=0.0, walk_deg_s_sqrt_s=0.0, noise_density_deg_s_sqrt_hz=0.0,
             gain=0.0, cross_axis=0.0, range_deg_s=math.inf, bits=0,
@@ -138,7 +138,8 @@ def read_part(file: str, text: str) -> Part:
     """The part that the TOML `text` describes; ValueError that begins with `file`."""
     data = read_toml(file, text)
     about = {key: _about(file, key, data.pop(key, None)) for key in _ABOUT}
-    devices, sources = {}, {}
+    devices: dict[str, Any] = {}
+    sources: dict[str, str] = {}
     for kind, figures in data.items():
         if kind not in KINDS or not isinstance(figures, dict):
             raise ValueError(f"{file}: unknown section [{kind}]: {near_misses(kind, [*KINDS, *_ABOUT])}")
@@ -163,36 +164,36 @@ def _device(file: str, kind: str, figures: Mapping[str, Any]) -> tuple[Any, dict
     perfect = PERFECT[kind]
     hints = get_type_hints(type(perfect))
     known = [f.name for f in fields(perfect)]
-    given, sources = {}, {}
+    given: dict[str, Any] = {}
+    sources: dict[str, str] = {}
     for key, figure in figures.items():
         where = f"{file}: {kind}.{key}"
         if key not in known:
             raise ValueError(f"{where}: unknown key: {near_misses(key, known)}")
-        value, sources[f"{kind}.{key}"] = _figure(where, unit_of(key), figure)
+        value, sources[f"{kind}.{key}"] = _figure(where, figure)
         try:
             given[key] = typed(value, hints[key])
         except ValueError as error:
-            raise ValueError(f"{where} = {value!r} {unit_of(key)}".rstrip() + f": {error}") from None
+            raise ValueError(f"{shown(where, value)}: {error}") from None
     try:
         return replace(perfect, **given), sources
     except ValueError as error:  # names the dataclass: here it is the section of a file
         raise ValueError(f"{file}: {str(error).replace(f'{type(perfect).__name__}.', f'{kind}.', 1)}") from None
 
 
-def _figure(where: str, unit: str, figure: Any) -> tuple[Any, str]:
+def _figure(where: str, figure: Any) -> tuple[Any, str]:
     """Value and source of one figure, ``{ value = 1.0, source = "typical" }``."""
-    form = '{ value = ..., source = "..." }'
+    form = 'write { value = ..., source = "..." }'
     if not isinstance(figure, dict):
-        raise ValueError(f"{where} = {figure!r} {unit}".rstrip() + f": has no source; write {form}")
+        raise ValueError(f"{shown(where, figure)}: has no source; {form}")
     if extra := sorted(set(figure) - {"value", "source"}):
-        raise ValueError(f"{where}: unknown key {extra[0]!r}; write {form}")
+        raise ValueError(f"{where}: unknown key {extra[0]!r}; {form}")
     if "value" not in figure:
-        raise ValueError(f"{where}: has no value ({unit or 'no unit'}); write {form}")
+        raise ValueError(f"{where}: has no value, {unit_of(where) or 'a number or a word'}; {form}")
     source = figure.get("source")
     if not isinstance(source, str) or not source.strip():
         raise ValueError(
-            f"{where} = {figure['value']!r} {unit}".rstrip()
-            + ": has no source; name the row of the data sheet, or say typical"
+            f"{shown(where, figure['value'])}: has no source; name the row of the data sheet, or say typical"
         )
     return figure["value"], source
 

@@ -113,7 +113,9 @@ def _read(name: str, files: Mapping[str, str]) -> tuple[str, dict[str, Any]]:
     if name.endswith(".toml"):
         return name, read_toml(name, read_text(Path(name), files, "sensor suite"))
     if name not in _suite_names():
-        raise ValueError(f"unknown sensor suite {name!r}: {near_misses(name, _suite_names())} (one's own: path/to/suite.toml)")
+        raise ValueError(
+            f"unknown sensor suite {name!r}: {near_misses(name, _suite_names())} (one's own: path/to/suite.toml)"
+        )
     path = FOLDER / f"{name}.toml"
     return path.name, read_toml(path.name, path.read_text(encoding="utf-8"))
 
@@ -170,7 +172,9 @@ def _read_by(file: str, kind: str, device: Any, converter: Any) -> Any:
         return device
     known = ("bits", "reference_v", "conversions")
     if not isinstance(converter, dict) or not {"bits", "reference_v"} <= set(converter) <= set(known):
-        raise ValueError(f"{file}: board.converter = {converter!r}: must have bits and reference_v, may have conversions")
+        raise ValueError(
+            f"{file}: board.converter = {converter!r}: must have bits and reference_v, may have conversions"
+        )
     bits, volts = converter["bits"], converter["reference_v"]
     if isinstance(bits, bool) or bits not in range(1, MOST_BITS + 1):
         raise ValueError(f"{file}: board.converter.bits = {bits!r} bit: choose a whole number from 1 to {MOST_BITS}")
@@ -183,5 +187,3 @@ def _read_by(file: str, kind: str, device: Any, converter: Any) -> Any:
     step_value = 1000.0 * volts / 2**bits / millivolts
     changes = {"bits": bits, step: step_value, "conversions": converter.get("conversions", device.conversions)}
     return replace(device, **changes)
-
-

@@ -24,7 +24,6 @@ from sim.sensors.gps import receive
 from sim.sensors.gyro import measure_rate
 from sim.sensors.magnetometer import measure_field
 
-
 UNIT = np.dtype(
     [
         ("dt_s", "f8"),
