@@ -14,15 +14,15 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log
 from sim.rng import stream
-from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer
+from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
 from sim.sensors.accelerometer import measure_force
 from sim.sensors.air_data import measure_air
 from sim.sensors.faults import FAULT, spoil
 from sim.sensors.fitting import SUITES as SUITES
 from sim.sensors.fitting import SuiteParams as SuiteParams
-from sim.sensors.gps import receive
 from sim.sensors.gyro import measure_rate
 from sim.sensors.magnetometer import measure_field
+from sim.sensors.receiver import receive
 
 UNIT = np.dtype(
     [
@@ -37,7 +37,9 @@ UNIT = np.dtype(
     align=True,
 )
 NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.NOISE, *air_data.NOISE], align=True)
-MEMORY = np.dtype([("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY)], align=True)
+MEMORY = np.dtype(
+    [("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY), ("gps", receiver.MEMORY)], align=True
+)
 
 
 class Snapshot(NamedTuple):
@@ -81,7 +83,7 @@ class Suite:
         gyro.draw(p.gyro, p.board, rates, source, noise)
         accelerometer.make(p.accelerometer, p.board, rates, source, unit["accelerometer"])
         accelerometer.draw(p.accelerometer, p.board, rates, source, noise)
-        gps.make(p.gps, rates, unit["gps"])
+        gps.make(p.gps, rates, source, unit["gps"])
         gps.draw(p.gps, rates, source, noise)
         if p.magnetometer is not None:
             magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"])
@@ -125,7 +127,7 @@ def _measure(truth, measured, noise, k, unit, memory, faults):  # type: ignore[n
     measured[k].dt_s = u.dt_s
     measure_rate(truth, measured, noise, k, u.gyro, m.gyro)
     measure_force(truth, measured, noise, k, u.accelerometer, u.board, m.accelerometer)
-    receive(truth, measured, noise, k, u.gps)
+    receive(truth, measured, noise, k, u.gps, m.gps)
     if u.magnetometer.fitted:
         measure_field(truth, measured, noise, k, u.magnetometer)
     if u.air.fitted:
