@@ -61,6 +61,17 @@ def require_device(params: Any) -> None:
         raise ValueError(f"{owner}.output = {params.output!r}: choose {', '.join(get_args(Output))}")
 
 
+def require_scale(params: Any, unit: str, range_name: str, step_name: str) -> None:
+    """Refuse a full scale that is not above 0 (infinite is none), or a converter step beyond it: ValueError."""
+    full_scale, step, owner = getattr(params, range_name), getattr(params, step_name), type(params).__name__
+    if not full_scale > 0.0:
+        raise ValueError(f"{owner}.{range_name} = {full_scale!r} {unit}: choose a number above 0, or infinity")
+    if not 0.0 <= step <= full_scale or math.isinf(step):
+        raise ValueError(
+            f"{owner}.{step_name} = {step!r} {unit}: choose a step within the range, or 0 for no converter"
+        )
+
+
 def sample_sigma(density_sqrt_hz: float, imu_hz: float) -> float:
     """Sigma of the mean over 1 / `imu_hz` of white noise with a one-sided spectral density, in its unit per root Hz.
 

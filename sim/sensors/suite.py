@@ -38,7 +38,13 @@ UNIT = np.dtype(
 )
 NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.NOISE, *air_data.NOISE], align=True)
 MEMORY = np.dtype(
-    [("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY), ("gps", receiver.MEMORY)], align=True
+    [
+        ("gyro", gyro.MEMORY),
+        ("accelerometer", accelerometer.MEMORY),
+        ("gps", receiver.MEMORY),
+        ("air", air_data.MEMORY),
+    ],
+    align=True,
 )
 
 
@@ -60,6 +66,10 @@ class Suite:
     def __init__(
         self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: NDArray[np.void] | None = None
     ) -> None:
+        for what in ("magnetometer", "airspeed", "barometer"):
+            part = getattr(params, what)
+            if part is not None:
+                rates.steps_per_sample(what, part.rate_hz)  # refused here, before the flight
         self.params = params
         self.rates = rates
         self._source = partial(stream, seed, flight)
@@ -131,6 +141,6 @@ def _measure(truth, measured, noise, k, unit, memory, faults):  # type: ignore[n
     if u.magnetometer.fitted:
         measure_field(truth, measured, noise, k, u.magnetometer)
     if u.air.fitted:
-        measure_air(truth, measured, noise, k, u.air)
+        measure_air(truth, measured, noise, k, u.air, m.air)
     if len(faults):
         spoil(truth, measured, k, faults)
