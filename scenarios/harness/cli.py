@@ -63,11 +63,15 @@ AircraftOption = Annotated[str | None, typer.Option("--aircraft", help="Name of 
 AutopilotOption = Annotated[
     str | None, typer.Option("--autopilot", help="Registered name, module:Class or file.py:Class.")
 ]
-GpsRateOption = Annotated[float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS.")]
+GpsRateOption = Annotated[
+    float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.")
+]
 ImuRateOption = Annotated[
     int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
 ]
-SensorsOption = Annotated[str | None, typer.Option("--sensors", help="Name of a sensor suite.")]
+SensorsOption = Annotated[
+    str | None, typer.Option("--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.")
+]
 JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
@@ -120,7 +124,7 @@ def _root(
 
 @app.command("list")
 def list_(json_: JsonOption = None) -> None:
-    """What there is: scenarios, estimators, autopilots, aircraft, sensor suites."""
+    """What there is: scenarios, estimators, autopilots, aircraft, sensor suites, parts."""
     from scenarios.harness.catalogue import catalogue
 
     with _reporting(json_) as report:

@@ -51,6 +51,7 @@ class AccelerometerParams:
     conversions : of the converter averaged in a sample; 0 is a continuous mean
     output : digital, ratiometric (in proportion to the supply) or absolute (referred to a fixed voltage)
     null_g : its output voltage without force, expressed in g; what a wrong supply adds in proportion
+    sensitivity_mv_g : of an analogue output; a board's converter makes its step of it
     """
 
     bias_g: float = 0.02
@@ -69,9 +70,11 @@ class AccelerometerParams:
     conversions: int = 0
     output: Output = "digital"
     null_g: float = 0.0
+    sensitivity_mv_g: float = 0.0
 
     def __post_init__(self) -> None:
         require(self, "g", "bias_g", "step_g", "null_g")
+        require(self, "mV/g", "sensitivity_mv_g")
         require(self, "mg/K", "bias_per_k_mg")
         require(self, "ug", "bias_instability_ug")
         require(self, "ug/sqrt(s)", "walk_ug_sqrt_s")

@@ -55,6 +55,7 @@ class GyroParams:
     conversions : of the converter averaged in a sample; 0 is a continuous mean
     output : digital, ratiometric (in proportion to the supply) or absolute (referred to a fixed voltage)
     null_deg_s : its output voltage without rotation, expressed in deg/s; what a wrong supply adds in proportion
+    sensitivity_mv_deg_s : of an analogue output; a board's converter makes its step of it
     """
 
     bias_deg_s: float = 1.0
@@ -75,9 +76,11 @@ class GyroParams:
     conversions: int = 0
     output: Output = "digital"
     null_deg_s: float = 0.0
+    sensitivity_mv_deg_s: float = 0.0
 
     def __post_init__(self) -> None:
         require(self, "deg/s", "bias_deg_s", "bias_instability_deg_s", "step_deg_s", "null_deg_s")
+        require(self, "mV/(deg/s)", "sensitivity_mv_deg_s")
         require(self, "deg/s/K", "bias_per_k_deg_s")
         require(self, "deg/s/sqrt(Hz)", "noise_density_deg_s_sqrt_hz")
         require(self, "1/K", "gain_per_k")

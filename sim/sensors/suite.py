@@ -3,9 +3,7 @@
 Row k of the measured log is filled from the truth of rows up to k alone.
 """
 
-from dataclasses import dataclass, field
 from functools import partial
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -17,48 +15,15 @@ from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log
 from sim.rng import stream
 from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
-from sim.sensors.accelerometer import AccelerometerParams, measure_force
-from sim.sensors.air_data import AirspeedParams, BarometerParams, measure_air
-from sim.sensors.board import BoardParams, attend
+from sim.sensors.accelerometer import measure_force
+from sim.sensors.air_data import measure_air
+from sim.sensors.board import attend
 from sim.sensors.faults import FAULT, spoil
-from sim.sensors.gps import GpsParams
-from sim.sensors.gyro import GyroParams, measure_rate
-from sim.sensors.magnetometer import MagnetometerParams, measure_field
+from sim.sensors.fitting import SUITES as SUITES
+from sim.sensors.fitting import SuiteParams as SuiteParams
+from sim.sensors.gyro import measure_rate
+from sim.sensors.magnetometer import measure_field
 from sim.sensors.receiver import receive
-
-
-@dataclass(frozen=True, slots=True)
-class SuiteParams:
-    """What is fitted, and how good each part is; None is not fitted."""
-
-    gyro: GyroParams = field(default_factory=GyroParams)
-    accelerometer: AccelerometerParams = field(default_factory=AccelerometerParams)
-    gps: GpsParams = field(default_factory=GpsParams)
-    magnetometer: MagnetometerParams | None = None
-    airspeed: AirspeedParams | None = None
-    barometer: BarometerParams | None = None
-    board: BoardParams = field(default_factory=BoardParams)
-
-
-_INF = float("inf")
-
-SUITES = MappingProxyType(
-    {
-        "generic": SuiteParams(),
-        "generic_6g": SuiteParams(accelerometer=AccelerometerParams(range_g=6.0)),
-        "ideal": SuiteParams(
-            GyroParams(
-                bias_deg_s=0.0, drift_deg_s_min=0.0, walk_deg_s_sqrt_s=0.0, noise_density_deg_s_sqrt_hz=0.0,
-                gain=0.0, cross_axis=0.0, range_deg_s=_INF, bits=0,
-            ),
-            AccelerometerParams(bias_g=0.0, noise_density_ug_sqrt_hz=0.0, range_g=_INF, bits=0),
-            GpsParams(
-                filter_s=0.0, latency_s=0.0, first_fix_s=0.0, velocity_noise_m_s=0.0,
-                wander_horizontal_m=0.0, wander_vertical_m=0.0,
-            ),
-        ),
-    }
-)  # fmt: skip
 
 UNIT = np.dtype(
     [
