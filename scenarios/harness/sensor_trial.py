@@ -1,0 +1,296 @@
+"""Trials of single sensors: hours at rest, a manoeuvre, a step and a turn, each against a truth in closed form.
+
+They run through the sensors that fly, `draw` of the modules and `Suite.measure`, with no aeroplane around them.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, ClassVar, Final
+
+import numpy as np
+
+from estimator.interface import Array
+from sim.clock import Rates
+from sim.log import Log, Phase
+from sim.place import LATITUDE_DEG
+from sim.prescribed_plant import CALM, Kinematics, motion_rows, rotation_from_euler
+from sim.rng import stream
+from sim.sensors import accelerometer, allan, gyro
+from sim.sensors.board import BoardParams
+from sim.sensors.datasheet import PERFECT
+from sim.sensors.gps import GpsParams
+from sim.sensors.noise import STANDARD_GRAVITY_M_S2
+from sim.sensors.suite import Suite, SuiteParams
+
+FLIGHTS: Final = 22  # of three axes: 66 hours at rest, of which the mean curve scatters by an eighth of one's
+HOUR_S: Final = 3600.0
+IMU_HZ: Final = 50
+SEED: Final = 0
+REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: what a first-order lag reaches in its time constant
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """How a gyro or an accelerometer is simulated at rest, and which fields of its parameters say what.
+
+    unit : of the page      scale : of that unit, per SI      columns : of the errors drawn, bias and noise
+    """
+
+    module: Any
+    unit: str
+    scale: float
+    columns: tuple[str, str]
+    density: str
+    instability: str
+    walk: str
+
+
+INERTIAL: Final = {
+    "gyro": Inertial(
+        gyro, "deg/s", math.degrees(1.0), ("gyro_bias_b_rad_s", "gyro_noise_b_rad_s"),
+        "noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s",
+    ),
+    "accelerometer": Inertial(
+        accelerometer, "ug", 1e6 / STANDARD_GRAVITY_M_S2, ("force_bias_b_m_s2", "force_noise_b_m_s2"),
+        "noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s",
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """One coefficient as simulated and as the data sheet has it, None where that is silent."""
+
+    measured: float
+    datasheet: float | None
+    unit: str
+
+    @property
+    def difference(self) -> float | None:
+        """Relative difference of the measured one."""
+        return self.measured / self.datasheet - 1.0 if self.datasheet else None
+
+    def to_json(self) -> dict[str, Any]:
+        return {"measured": self.measured, "datasheet": self.datasheet, "unit": self.unit}
+
+
+@dataclass(frozen=True, slots=True)
+class AtRest:
+    """A gyro or an accelerometer that has lain still, before its converter and without warming up.
+
+    tau_s : (n,)      variances : (n, axes), Allan variances in the square of `unit`
+    noise : fitted to their mean      stated : the noise of the data sheet, zero where that is silent
+    """
+
+    kind: str
+    unit: str
+    tau_s: Array
+    variances: Array
+    noise: allan.NoiseModel
+    stated: allan.NoiseModel
+
+    @property
+    def coefficients(self) -> dict[str, Coefficient]:
+        """White noise, flicker noise, random walk, by their names in the JSON."""
+        m, d, unit = self.noise, self.stated, self.unit
+        return {
+            "noise_density": Coefficient(m.density, d.density or None, f"{unit}/sqrt(Hz)"),
+            "bias_instability": Coefficient(m.flicker, d.flicker or None, unit),
+            "rate_random_walk": Coefficient(m.walk, d.walk or None, f"{unit}/sqrt(s)"),
+        }
+
+    @property
+    def sample_sigma(self) -> float:
+        """Sigma of the white noise of one sample."""
+        return self.noise.white * math.sqrt(IMU_HZ)
+
+    @property
+    def hours(self) -> float:
+        """Axis-hours it lay still."""
+        return self.variances.shape[1]
+
+
+def at_rest(
+    kind: str, params: Any, flights: int = FLIGHTS, seconds: float = HOUR_S, told: Callable[[], None] = lambda: None
+) -> AtRest:
+    """Simulate `flights` records of three axes and of `seconds`; `told` is called after each."""
+    how, rates = INERTIAL[kind], Rates(imu_hz=IMU_HZ)
+    if kind == "gyro":
+        params = replace(params, drift_deg_s_min=0.0)  # a ramp is how a gyro warms up
+    noise = np.zeros(rates.ticks(seconds), list(how.module.NOISE))
+    m = allan.octaves(len(noise))
+    found = []
+    for flight in range(flights):
+        how.module.draw(params, BoardParams(), rates, partial(stream, SEED, flight), noise)
+        signal = how.scale * (noise[how.columns[0]] + noise[how.columns[1]])
+        found.append(allan.variance(signal, m))
+        told()
+    tau_s, variances = m / IMU_HZ, np.concatenate(found, axis=1)
+    return AtRest(kind, how.unit, tau_s, variances, allan.fit(tau_s, variances), stated(kind, params))
+
+
+def stated(kind: str, params: Any) -> allan.NoiseModel:
+    """The noise that the parameters of a gyro or an accelerometer state, in the unit of the page."""
+    how = INERTIAL[kind]
+    density, flicker, walk = (getattr(params, name) for name in (how.density, how.instability, how.walk))
+    return allan.NoiseModel(density / math.sqrt(2.0), flicker, walk)
+
+
+@dataclass(frozen=True, slots=True)
+class Exercise:
+    """Level flight, a pull-up to 2.5 g, a roll to 60 deg and one back; each change of rate and force is a sine squared.
+
+    The pull-up lasts from 1 to 2 s, the rolls from 3 to 4 s and from 4.5 to 5.5 s.
+    """
+
+    pull_m_s2: float = 1.5 * STANDARD_GRAVITY_M_S2
+    roll_rad_s: float = math.radians(120.0)
+    phase: ClassVar[Phase] = Phase.FLYING
+    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
+    seconds: ClassVar[float] = 7.0
+
+    def at(self, t_s: Array) -> Kinematics:
+        """See `Motion.at`."""
+        a, v, p = _pulse(t_s - 1.0)
+        out, angle_out, _ = _pulse(t_s - 3.0)
+        back, angle_back, _ = _pulse(t_s - 4.5)
+        still = np.zeros_like(t_s)
+        return Kinematics(
+            rotation_from_euler(self.roll_rad_s * (angle_out - angle_back), still, still),
+            np.stack([self.roll_rad_s * (out - back), still, still], axis=1),
+            np.stack([12.0 * t_s, still, -60.0 - self.pull_m_s2 * p], axis=1),
+            np.stack([still + 12.0, still, -self.pull_m_s2 * v], axis=1),
+            np.stack([still, still, -self.pull_m_s2 * a], axis=1),
+        )
+
+
+def _pulse(t_s: Array) -> tuple[Array, Array, Array]:
+    """sin^2(pi t) for 0 < t < 1, its integral, and the integral of that."""
+    t, after = np.clip(t_s, 0.0, 1.0), np.maximum(t_s - 1.0, 0.0)
+    once = t / 2.0 - np.sin(2.0 * np.pi * t) / (4.0 * np.pi)
+    twice = t**2 / 4.0 + (np.cos(2.0 * np.pi * t) - 1.0) / (8.0 * np.pi**2)
+    return np.sin(np.pi * t) ** 2, once, twice + after / 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedStep:
+    """North at `before_m_s`, at once at `after_m_s` from `when_s` on."""
+
+    when_s: float
+    before_m_s: float = 5.0
+    after_m_s: float = 15.0
+    phase: ClassVar[Phase] = Phase.FLYING
+    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
+
+    def at(self, t_s: Array) -> Kinematics:
+        """See `Motion.at`."""
+        speed = np.where(t_s >= self.when_s, self.after_m_s, self.before_m_s)
+        way = self.before_m_s * t_s + (self.after_m_s - self.before_m_s) * np.maximum(t_s - self.when_s, 0.0)
+        return _level(way, 0.0 * way, speed, 0.0 * way, 0.0 * way)
+
+
+@dataclass(frozen=True, slots=True)
+class QuarterTurn:
+    """North, from `when_s` on to the right, until the course is east."""
+
+    when_s: float
+    speed_m_s: float = 12.0
+    rate_rad_s: float = math.radians(45.0)
+    phase: ClassVar[Phase] = Phase.FLYING
+    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
+
+    def at(self, t_s: Array) -> Kinematics:
+        """See `Motion.at`."""
+        course = np.clip(self.rate_rad_s * (t_s - self.when_s), 0.0, math.pi / 2.0)
+        radius = self.speed_m_s / self.rate_rad_s
+        done = np.maximum(t_s - self.when_s - math.pi / 2.0 / self.rate_rad_s, 0.0)
+        north = self.speed_m_s * np.minimum(t_s, self.when_s) + radius * np.sin(course)
+        east = radius * (1.0 - np.cos(course)) + self.speed_m_s * done
+        turning = np.where((course > 0.0) & (done == 0.0), self.rate_rad_s, 0.0)
+        return _level(north, east, self.speed_m_s, course, turning)
+
+
+def _level(north: Array, east: Array, speed: Array | float, course: Array, rate: Array) -> Kinematics:
+    """Level motion with the wings level and the nose on course."""
+    still, sine, cosine = np.zeros_like(north), np.sin(course), np.cos(course)
+    return Kinematics(
+        rotation_from_euler(still, still, course),
+        np.stack([still, still, rate], axis=1),
+        np.stack([north, east, still - 60.0], axis=1),
+        np.stack([speed * cosine, speed * sine, still], axis=1),
+        np.stack([-speed * rate * sine, speed * rate * cosine, still], axis=1),
+    )
+
+
+def fitted(devices: dict[str, Any]) -> SuiteParams:
+    """A suite of `devices`, kind -> parameters; gyro, accelerometer and GPS are perfect where not named."""
+    always = {kind: PERFECT[kind] for kind in ("gyro", "accelerometer", "gps")}
+    return SuiteParams(**(always | devices))
+
+
+def fly(params: SuiteParams, motion: Any, seconds: float, rates: Rates, quiet: bool = False) -> Log:
+    """What the suite makes of `motion`; where `quiet`, without anything that is drawn tick by tick."""
+    log = Log.empty(rates.ticks(seconds))
+    log.truth[:] = motion_rows(motion, len(log), rates.dt_s, math.radians(LATITUDE_DEG))
+    suite = Suite(params, rates, SEED)
+    suite.reset(log)
+    if quiet:
+        drawn = suite.snapshot()
+        suite.restore(drawn._replace(noise=np.zeros_like(drawn.noise)))
+    for k in range(len(log)):
+        suite.measure(k)
+    return log
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """How a receiver follows a step of speed and a quarter turn, without its noise.
+
+    speed_delay_s, course_delay_s : from when the truth has done 63 % of the change until a report says so, the
+    mean over steps at all times between two reports
+    least_speed_m_s : the least that is reported in the turn      step, turn : one flight of each
+    when_s : start of both changes in those
+    """
+
+    speed_delay_s: float
+    course_delay_s: float
+    least_speed_m_s: float
+    step: Log
+    turn: Log
+    when_s: float
+
+
+SETTLED_S: Final = 12.0  # before the change, and time given to it
+
+
+def respond(params: GpsParams) -> Response:
+    """Try a receiver on a step of speed and on a turn."""
+    rates = Rates(imu_hz=IMU_HZ, gps_hz=params.rate_hz)
+    suite = fitted({"gps": replace(params, first_fix_s=0.0)})
+    lag_s = params.filter_s + params.latency_s
+    start_s = SETTLED_S + 3.0 * lag_s
+    end_s = start_s + SETTLED_S + 6.0 * lag_s
+    ticks = max(1, round(IMU_HZ / params.rate_hz))
+    speed, course, slowest, step, turn = [], [], [], None, None
+    for shift in range(0, ticks, max(1, ticks // 10)):
+        when_s = start_s + shift / IMU_HZ
+        to_mid_s = REACHED * math.pi / 2.0 / QuarterTurn(when_s).rate_rad_s
+        step = fly(suite, SpeedStep(when_s), end_s, rates, quiet=True)
+        turn = fly(suite, QuarterTurn(when_s), end_s, rates, quiet=True)
+        speed.append(_reaches(step, step.measured["gps_speed_m_s"], 5.0 + 10.0 * REACHED, when_s))
+        angle = (turn.measured["gps_course_rad"] + math.pi) % (2.0 * math.pi) - math.pi
+        course.append(_reaches(turn, angle, REACHED * math.pi / 2.0, when_s) - to_mid_s)
+        after = turn.truth["t_s"] > when_s
+        slowest.append(float(turn.measured["gps_speed_m_s"][after].min()))
+    return Response(float(np.mean(speed)), float(np.mean(course)), min(slowest), step, turn, when_s)
+
+
+def _reaches(log: Log, value: Array, level: float, since_s: float) -> float:
+    """Seconds from `since_s` until `value` is at `level` or above; infinite where it never is."""
+    t_s = log.truth["t_s"]
+    there = (t_s > since_s) & (value >= level)
+    return float(t_s[np.argmax(there)]) - since_s if there.any() else math.inf
+
+
