@@ -4,7 +4,7 @@ They run through the sensors that fly, `draw` of the modules and `Suite.measure`
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Final
@@ -14,13 +14,15 @@ import numpy as np
 from estimator.interface import Array
 from sim.clock import Rates
 from sim.log import Log, Phase
-from sim.place import LATITUDE_DEG
+from sim.magnetic_field import field_e_ut
+from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
 from sim.prescribed_plant import CALM, Kinematics, motion_rows, rotation_from_euler
 from sim.rng import stream
 from sim.sensors import accelerometer, allan, gyro
 from sim.sensors.board import BoardParams
 from sim.sensors.datasheet import PERFECT
 from sim.sensors.gps import GpsParams
+from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.noise import STANDARD_GRAVITY_M_S2
 from sim.sensors.suite import Suite, SuiteParams
 
@@ -28,6 +30,8 @@ FLIGHTS: Final = 22  # of three axes: 66 hours at rest, of which the mean curve 
 HOUR_S: Final = 3600.0
 IMU_HZ: Final = 50
 SEED: Final = 0
+SETTLED_S: Final = 12.0  # time given to a receiver, beside its own delays
+PHASES: Final = 8  # of a change between two reports
 REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: what a first-order lag reaches in its time constant
 
 
@@ -86,6 +90,7 @@ class AtRest:
 
     kind: str
     unit: str
+    axis_hours: float
     tau_s: Array
     variances: Array
     noise: allan.NoiseModel
@@ -107,9 +112,9 @@ class AtRest:
         return self.noise.white * math.sqrt(IMU_HZ)
 
     @property
-    def hours(self) -> float:
-        """Axis-hours it lay still."""
-        return self.variances.shape[1]
+    def deviation(self) -> Array:
+        """Allan deviation, root of the mean variance, shape (n,)."""
+        return np.asarray(np.sqrt(self.variances.mean(axis=1)))
 
 
 def at_rest(
@@ -128,7 +133,8 @@ def at_rest(
         found.append(allan.variance(signal, m))
         told()
     tau_s, variances = m / IMU_HZ, np.concatenate(found, axis=1)
-    return AtRest(kind, how.unit, tau_s, variances, allan.fit(tau_s, variances), stated(kind, params))
+    hours = variances.shape[1] * seconds / 3600.0
+    return AtRest(kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), stated(kind, params))
 
 
 def stated(kind: str, params: Any) -> allan.NoiseModel:
@@ -224,10 +230,10 @@ def _level(north: Array, east: Array, speed: Array | float, course: Array, rate:
     )
 
 
-def fitted(devices: dict[str, Any]) -> SuiteParams:
+def fitted(devices: Mapping[str, Any]) -> SuiteParams:
     """A suite of `devices`, kind -> parameters; gyro, accelerometer and GPS are perfect where not named."""
     always = {kind: PERFECT[kind] for kind in ("gyro", "accelerometer", "gps")}
-    return SuiteParams(**(always | devices))
+    return SuiteParams(**(always | dict(devices)))
 
 
 def fly(params: SuiteParams, motion: Any, seconds: float, rates: Rates, quiet: bool = False) -> Log:
@@ -242,6 +248,11 @@ def fly(params: SuiteParams, motion: Any, seconds: float, rates: Rates, quiet: b
     for k in range(len(log)):
         suite.measure(k)
     return log
+
+
+def exercise(devices: Mapping[str, Any]) -> Log:
+    """The exercise as gyro and accelerometer report it."""
+    return fly(fitted(devices), Exercise(), Exercise.seconds, Rates(imu_hz=IMU_HZ))
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +273,6 @@ class Response:
     when_s: float
 
 
-SETTLED_S: Final = 12.0  # before the change, and time given to it
 
 
 def respond(params: GpsParams) -> Response:
@@ -274,7 +284,7 @@ def respond(params: GpsParams) -> Response:
     end_s = start_s + SETTLED_S + 6.0 * lag_s
     ticks = max(1, round(IMU_HZ / params.rate_hz))
     speed, course, slowest, step, turn = [], [], [], None, None
-    for shift in range(0, ticks, max(1, ticks // 10)):
+    for shift in np.unique(np.linspace(0, ticks, PHASES, endpoint=False, dtype=int)).tolist():
         when_s = start_s + shift / IMU_HZ
         to_mid_s = REACHED * math.pi / 2.0 / QuarterTurn(when_s).rate_rad_s
         step = fly(suite, SpeedStep(when_s), end_s, rates, quiet=True)
@@ -294,3 +304,91 @@ def _reaches(log: Log, value: Array, level: float, since_s: float) -> float:
     return float(t_s[np.argmax(there)]) - since_s if there.any() else math.inf
 
 
+
+
+@dataclass(frozen=True, slots=True)
+class MagneticTrial:
+    """Two level turns in the earth's field, without a motor, and the heading that follows from the readings.
+
+    field_e_ut : of the earth, shape (3,)      truth_deg, error_deg : of the heading, of every sample, shape (n,)
+    readings_ut : shape (n, 3)
+    """
+
+    field_e_ut: Array
+    truth_deg: Array
+    error_deg: Array
+    readings_ut: Array
+
+    @property
+    def horizontal_ut(self) -> float:
+        return math.hypot(*self.field_e_ut[:2].tolist())
+
+    @property
+    def heading_rms_deg(self) -> float:
+        return float(np.sqrt(np.mean(self.error_deg**2)))
+
+
+@dataclass(frozen=True, slots=True)
+class Spin:
+    """Level on the spot, turning right."""
+
+    rate_rad_s: float = 2.0 * math.pi / 20.0
+    phase: ClassVar[Phase] = Phase.HELD
+    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
+
+    def at(self, t_s: Array) -> Kinematics:
+        """See `Motion.at`."""
+        return _level(0.0 * t_s, 0.0 * t_s, 0.0, self.rate_rad_s * t_s, 0.0 * t_s + self.rate_rad_s)
+
+
+def turn_around(params: MagnetometerParams) -> MagneticTrial:
+    """Turn a magnetometer twice round on the level, its latency left out; heading by the two level components."""
+    suite = fitted({"magnetometer": replace(params, latency_s=0.0)})
+    log = fly(suite, Spin(), 40.0, Rates(imu_hz=IMU_HZ))
+    new = log.measured["mag_new"] == 1
+    field = field_e_ut(LATITUDE_DEG, LONGITUDE_DEG, ELEVATION_M, params.year)
+    readings = log.measured["mag_b_ut"][new]
+    truth = np.arctan2(log.truth["R_eb"][new, 1, 0], log.truth["R_eb"][new, 0, 0])
+    heading = math.atan2(field[1], field[0]) - np.arctan2(readings[:, 1], readings[:, 0])
+    error = (heading - truth + math.pi) % (2.0 * math.pi) - math.pi
+    return MagneticTrial(field, np.degrees(truth) % 360.0, np.degrees(error), readings)
+
+
+@dataclass(frozen=True, slots=True)
+class Surge:
+    """North, airspeed and height swinging about 12 m/s and 60 m by 5 m/s and 10 m, once in 20 s; the nose level."""
+
+    phase: ClassVar[Phase] = Phase.FLYING
+    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
+
+    def at(self, t_s: Array) -> Kinematics:
+        """See `Motion.at`."""
+        w = 2.0 * math.pi / 20.0
+        sine, cosine, still = np.sin(w * t_s), np.cos(w * t_s), np.zeros_like(t_s)
+        return Kinematics(
+            rotation_from_euler(still, still, still),
+            np.stack([still, still, still], axis=1),
+            np.stack([12.0 * t_s - 5.0 / w * cosine, still, -60.0 + 10.0 * cosine], axis=1),
+            np.stack([12.0 + 5.0 * sine, still, -10.0 * w * sine], axis=1),
+            np.stack([5.0 * w * cosine, still, -10.0 * w**2 * cosine], axis=1),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class AirTrial:
+    """A minute of airspeed and height that swing, as air-data sensors report them."""
+
+    log: Log
+
+    def errors(self, kind: str) -> Array:
+        """Reading less truth of every sample, m/s or m."""
+        new = self.log.measured["air_new"] == 1
+        truth, measured = self.log.truth[new], self.log.measured[new]
+        if kind == "airspeed":
+            return np.asarray(measured["airspeed_m_s"] - truth["airspeed_m_s"])
+        return np.asarray(measured["baro_height_m"] + truth["p_e_m"][:, 2])
+
+
+def swing(devices: Mapping[str, Any]) -> AirTrial:
+    """Try airspeed sensor and barometer out."""
+    return AirTrial(fly(fitted(devices), Surge(), 60.0, Rates(imu_hz=IMU_HZ)))
