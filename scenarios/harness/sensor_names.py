@@ -3,33 +3,49 @@
 A name is matched loosely: ``ITG-3200`` is ``itg3200``.
 """
 
-from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Final
 
 from scenarios.harness import console
 from scenarios.harness.sensor_page import Subject
-from sim.sensors.datasheet import KINDS, Part, load_part, part_names
-from sim.sensors.fitting import load_suite, suite_members, suite_names, suite_summary
+from sim.params import near_misses
+from sim.sensors.datasheet import KINDS, Part, load_part, part_names, read_text, read_toml
+from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_parts
 
-BUILT_IN = ("generic", "perfect")
+SHORT: Final = {
+    "gyro": "gyro",
+    "accelerometer": "force",
+    "gps": "GPS",
+    "magnetometer": "compass",
+    "airspeed": "airspeed",
+    "barometer": "baro",
+}
 
 
 def subject(name: str) -> Subject:
-    """What the page of `name` is about: a suite, a part, or a part's file.
+    """What the page of `name` is about: a suite, a part, or the file of either.
 
     Raises
     ------
     ValueError      one line: nothing of that name, with what comes near, or what is wrong in the file
     """
-    suite = _loose(name)
-    return _suite(suite) if suite is not None else _part(load_part(name))
+    suites = {_plain(suite): suite for suite in SUITES}
+    if _plain(name) in suites:
+        return _suite(suites[_plain(name)])
+    if name.endswith(".toml"):
+        return _suite(name) if _is_suite(name) else _part(load_part(name))
+    known = {_plain(part): part for part in [*part_names(), *suites, "perfect"]}
+    if _plain(name) not in known:
+        hint = near_misses(_plain(name), known)
+        raise ValueError(f"unknown part or suite {name!r}: {hint} (one's own: path/to/part.toml)")
+    return _part(load_part(name))
 
 
-def _loose(name: str) -> str | None:
-    """The suite that `name` means, None where it means none."""
-    plain = {_plain(suite): suite for suite in suite_names()}
-    return plain.get(_plain(name))
+def _is_suite(path: str) -> bool:
+    """Whether the file names parts, which a part's has tables for."""
+    data = read_toml(path, read_text(Path(path), NO_FILES, "part"))
+    return any(isinstance(data.get(kind), str) for kind in KINDS)
 
 
 def _plain(name: str) -> str:
@@ -43,16 +59,18 @@ def _part(part: Part) -> Subject:
 
 
 def _suite(name: str) -> Subject:
+    members = suite_parts(name)
+    summary = members.pop("summary")
     fitted = load_suite(name)
     devices = {kind: getattr(fitted, kind) for kind in KINDS if getattr(fitted, kind) is not None}
-    return Subject(name, suite_summary(name), "", suite_members(name), devices, MappingProxyType({}))
+    return Subject(name, summary, "", members, devices, MappingProxyType({}))
 
 
 def to_json() -> dict[str, Any]:
     """Everything there is: parts with what is in them, suites with their members."""
     return {
         "parts": {name: _part_json(load_part(name)) for name in part_names()},
-        "suites": {name: {"about": suite_summary(name)} | dict(suite_members(name)) for name in suite_names()},
+        "suites": {name: suite_parts(name) for name in SUITES},
     }
 
 
@@ -69,14 +87,12 @@ def tell() -> None:
         part = load_part(name)
         rows.append([name, ", ".join(_word(kind) for kind in part.devices), f"{part.maker}, {part.summary}"])
     out.print(console.table("Parts", ("", "", ""), rows, text=(0, 1, 2), wrapping=(1, 2)))
-    kinds = [kind for kind in KINDS if any(kind in suite_members(name) for name in suite_names())]
-    rows = [[name, *_cells(suite_members(name), kinds)] for name in suite_names()]
-    headings = ("", *(_word(kind) for kind in kinds))
-    out.print(console.table("Suites", headings, rows, text=range(len(headings)), wrapping=range(1, len(headings))))
-
-
-def _cells(members: Mapping[str, str], kinds: list[str]) -> list[str]:
-    return [members.get(kind, "-") for kind in kinds]
+    suites = {name: suite_parts(name) for name in SUITES}
+    kinds = [kind for kind in KINDS if any(kind in members for members in suites.values())]
+    rows = [[name, *(members.get(kind, "-") for kind in kinds)] for name, members in suites.items()]
+    grid = console.table("Suites", ["", *(SHORT[kind] for kind in kinds)], rows, text=range(len(kinds) + 1))
+    grid.padding = (0, 1, 0, 0)  # seven columns side by side on 80
+    out.print(grid)
 
 
 def _word(kind: str) -> str:

@@ -18,6 +18,7 @@ from scenarios.harness.sensor_trial import (
     MagneticTrial,
     Response,
 )
+from sim.log import Log
 from sim.params import unit_of, words_of
 from sim.sensors.noise import step_of
 
@@ -53,7 +54,7 @@ class Page:
 
     subject: Subject
     at_rest: Mapping[str, AtRest]
-    exercise: sensor_trial.Log | None
+    exercise: Log | None
     response: Response | None
     magnetic: MagneticTrial | None
     air: AirTrial | None
@@ -241,8 +242,10 @@ def _coefficients(rest: AtRest) -> Any:
     rows = []
     for name, c in rest.coefficients.items():
         stated = _number(c.datasheet) if c.datasheet else "-"
-        rows.append([NAMES[name], _number(c.measured), stated, _percent(c), c.unit])
-    headings = ("", "simulated", "data sheet", "difference", "")
+        hidden = name == "rate_random_walk" and rest.walk_is_hidden
+        difference = "too small to see" if hidden else _percent(c)
+        rows.append([NAMES[name], _number(c.measured), stated, difference, c.unit])
+    headings = ("", "simulated", "stated", "difference", "")
     title = f"{_title(rest.kind)}: {rest.axis_hours:.0f} axis-hours at rest, {IMU_HZ} Hz, before the converter"
     return console.table(title, headings, rows, text=(0, 4))
 
@@ -257,5 +260,3 @@ def _number(value: Any) -> str:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value)
     return f"{value:.4g}" if math.isfinite(value) else "none"
-
-

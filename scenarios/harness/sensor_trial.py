@@ -112,6 +112,12 @@ class AtRest:
         return self.noise.white * math.sqrt(IMU_HZ)
 
     @property
+    def walk_is_hidden(self) -> bool:
+        """Whether the stated random walk makes less than a quarter of the variance of the longest average."""
+        longest_s = float(self.tau_s[-1])
+        return self.stated.walk > 0.0 and self.stated.walk**2 * longest_s / 3.0 < 0.25 * float(self.deviation[-1]) ** 2
+
+    @property
     def deviation(self) -> Array:
         """Allan deviation, root of the mean variance, shape (n,)."""
         return np.asarray(np.sqrt(self.variances.mean(axis=1)))
@@ -273,8 +279,6 @@ class Response:
     when_s: float
 
 
-
-
 def respond(params: GpsParams) -> Response:
     """Try a receiver on a step of speed and on a turn."""
     rates = Rates(imu_hz=IMU_HZ, gps_hz=params.rate_hz)
@@ -283,7 +287,7 @@ def respond(params: GpsParams) -> Response:
     start_s = SETTLED_S + 3.0 * lag_s
     end_s = start_s + SETTLED_S + 6.0 * lag_s
     ticks = max(1, round(IMU_HZ / params.rate_hz))
-    speed, course, slowest, step, turn = [], [], [], None, None
+    speed, course, slowest, flown = [], [], [], []
     for shift in np.unique(np.linspace(0, ticks, PHASES, endpoint=False, dtype=int)).tolist():
         when_s = start_s + shift / IMU_HZ
         to_mid_s = REACHED * math.pi / 2.0 / QuarterTurn(when_s).rate_rad_s
@@ -294,7 +298,8 @@ def respond(params: GpsParams) -> Response:
         course.append(_reaches(turn, angle, REACHED * math.pi / 2.0, when_s) - to_mid_s)
         after = turn.truth["t_s"] > when_s
         slowest.append(float(turn.measured["gps_speed_m_s"][after].min()))
-    return Response(float(np.mean(speed)), float(np.mean(course)), min(slowest), step, turn, when_s)
+        flown.append((step, turn, when_s))
+    return Response(float(np.mean(speed)), float(np.mean(course)), min(slowest), *flown[0])
 
 
 def _reaches(log: Log, value: Array, level: float, since_s: float) -> float:
@@ -302,8 +307,6 @@ def _reaches(log: Log, value: Array, level: float, since_s: float) -> float:
     t_s = log.truth["t_s"]
     there = (t_s > since_s) & (value >= level)
     return float(t_s[np.argmax(there)]) - since_s if there.any() else math.inf
-
-
 
 
 @dataclass(frozen=True, slots=True)
