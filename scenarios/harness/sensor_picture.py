@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.interface import Array
-from scenarios.harness.handbook_picture import BLUE, DPI, FAINT, GREEN, INK, ORANGE, RED, STYLE, VIOLET
+from scenarios.harness.handbook_picture import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, VIOLET
 from scenarios.harness.sensor_page import NAMES, Page
 from scenarios.harness.sensor_trial import AtRest, MagneticTrial, Response
 from sim.log import Log
@@ -87,10 +87,12 @@ def _allan(ax: Any, rest: AtRest) -> None:
     ax.set(xlim=(float(tau[0]) / 1.25, float(tau[-1]) * 1.25), ylim=(floor, top))
     unit = rest.unit.replace("ug", "µg")
     stated = rest.stated
-    _asymptote(ax, rest, stated.white / np.sqrt(tau), ORANGE, f"N = {stated.white:.3g} {unit}·√s", 0.08)
+    _asymptote(ax, rest, stated.white / np.sqrt(tau), ORANGE, f"N = {stated.white:.3g} {unit}·√s", 0.3, (-12.0, -10.0))
     flat = math.sqrt(allan.FLICKER) * stated.flicker
-    _asymptote(ax, rest, np.full_like(tau, flat), GREEN, f"0.664 B, B = {stated.flicker:.3g} {unit}", 0.5)
-    _asymptote(ax, rest, stated.walk * np.sqrt(tau / 3.0), VIOLET, f"K = {stated.walk:.3g} {unit}/√s", 0.93)
+    _asymptote(ax, rest, np.full_like(tau, flat), GREEN, f"0.664 B, B = {stated.flicker:.3g} {unit}", 0.0, (0.0, 8.0))
+    _asymptote(
+        ax, rest, stated.walk * np.sqrt(tau / 3.0), VIOLET, f"K = {stated.walk:.3g} {unit}/√s", 0.6, (-10.0, 7.0)
+    )
     ax.set(xlabel="averaged over τ, s", ylabel=f"Allan deviation, {unit}")
     ax.legend(loc="upper right")
     words = [f"{NAMES[n]} {_told(c.measured, c.datasheet)}" for n, c in rest.coefficients.items() if c.datasheet]
@@ -103,8 +105,10 @@ def _told(measured: float, stated: float) -> str:
     return f"{measured:.3g}, {100.0 * (measured / stated - 1.0):+.1f} %"
 
 
-def _asymptote(ax: Any, rest: AtRest, line: Array, colour: str, text: str, where: float) -> None:
-    """One term alone, with its name along it at the part `where` of what is visible of it."""
+def _asymptote(
+    ax: Any, rest: AtRest, line: Array, colour: str, text: str, where: float, offset: tuple[float, float]
+) -> None:
+    """One term alone, with its name beside it at the part `where` of what is visible of it."""
     tau, (floor, top) = rest.tau_s, ax.get_ylim()
     seen = (line > 1.15 * floor) & (line < 0.8 * top)
     if not seen.any():
@@ -112,11 +116,10 @@ def _asymptote(ax: Any, rest: AtRest, line: Array, colour: str, text: str, where
     ax.plot(tau, line, color=colour, lw=1.0)
     x = np.exp(np.interp(where, [0.0, 1.0], np.log(tau[seen][[0, -1]])))
     y = float(np.exp(np.interp(math.log(x), np.log(tau), np.log(line))))
-    side = "left" if where < 0.3 else "right" if where > 0.7 else "center"
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.8}
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
     ax.annotate(
-        text, (x, y), (0, -10), textcoords="offset points", fontsize=8.3, color=colour, ha=side, va="center",
-        bbox=box, zorder=6,
+        text, (x, y), offset, textcoords="offset points", fontsize=8.3, color=colour, ha="right" if offset[0] else "left",
+        va="center", bbox=box, zorder=6,
     )  # fmt: skip
 
 
@@ -143,14 +146,25 @@ def _exercise(ax: Any, kind: str, log: Log) -> None:
 
 
 def _still(ax: Any, kind: str, log: Log) -> None:
-    """A second of level flight, enlarged: the noise and the steps."""
+    """A second of level flight, enlarged: the noise, and the steps as grey lines; the bias as a number."""
     t_s, truth, reading = _signal(kind, log)
     shown = t_s < 1.0
-    scale = 1.0 if kind == "gyro" else 1e3
-    ax.axhline(scale * float(truth[shown].mean()), color=INK, lw=1.1)
-    ax.step(t_s[shown], scale * reading[shown], color=RED, lw=1.2, where="post")
-    ax.plot(t_s[shown], scale * reading[shown], "o", color=RED, ms=2.6)
-    ax.set(xlabel="time, s", ylabel="deg/s" if kind == "gyro" else "mg", title="Held still, enlarged")
+    scale, unit = (1.0, "deg/s") if kind == "gyro" else (1e3, "mg")
+    told = scale * reading[shown]
+    ax.step(t_s[shown], told, color=RED, lw=1.2, where="post")
+    ax.plot(t_s[shown], told, "o", color=RED, ms=2.6)
+    ax.grid(False)
+    levels = np.unique(told)
+    step = float(np.diff(levels).min()) if len(levels) > 1 else 0.0
+    spread = float(np.ptp(told)) or 1.0
+    if step > spread / 60.0:
+        first = math.floor(-0.3 * spread / step)
+        for i in range(first, math.ceil(1.3 * spread / step) + 1):
+            ax.axhline(float(levels[0]) + i * step, color=GRID, lw=0.8, zorder=0)
+    ax.set_ylim(told.min() - 0.25 * spread, told.max() + 0.35 * spread)
+    error = scale * float((reading - truth)[shown].mean())
+    ax.text(0.03, 0.96, f"mean error {error:+.3g} {unit}", transform=ax.transAxes, fontsize=8.3, color=FAINT, va="top")
+    ax.set(xlabel="time, s", ylabel=unit, title="Held still, enlarged")
     ax.ticklabel_format(axis="y", useOffset=False)
 
 
