@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.interface import Array
 from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors.noise import Output, Source, require
@@ -61,6 +62,14 @@ class BoardParams:
         if not (self.supply_tolerance or self.supply_sag) or output == "digital":
             return 0
         return (output == "ratiometric") - self.converter_ratiometric
+
+
+def warming(params: BoardParams, t_s: Array) -> Array:
+    """How much warmer than at power-up the parts are `t_s` later, K: a body that takes up a constant power.
+
+    Newton's law of cooling: dT/dt = (warming_k - T) / warming_s, T(0) = 0.
+    """
+    return -params.warming_k * np.expm1(-t_s / params.warming_s)
 
 
 UNIT = np.dtype(
