@@ -87,7 +87,7 @@ def _allan(ax: Any, rest: AtRest) -> None:
     ax.set(xlim=(float(tau[0]) / 1.25, float(tau[-1]) * 1.25), ylim=(floor, top))
     unit = rest.unit.replace("ug", "µg")
     stated = rest.stated
-    _asymptote(ax, rest, stated.white / np.sqrt(tau), ORANGE, f"N = {stated.white:.3g} {unit}·√s", 0.3, (-12.0, -10.0))
+    _asymptote(ax, rest, stated.white / np.sqrt(tau), ORANGE, f"N = {stated.white:.3g} {unit}·√s", 0.8, (-12.0, -8.0))
     flat = math.sqrt(allan.FLICKER) * stated.flicker
     _asymptote(ax, rest, np.full_like(tau, flat), GREEN, f"0.664 B, B = {stated.flicker:.3g} {unit}", 0.0, (0.0, 8.0))
     _asymptote(
@@ -118,8 +118,8 @@ def _asymptote(
     y = float(np.exp(np.interp(math.log(x), np.log(tau), np.log(line))))
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
     ax.annotate(
-        text, (x, y), offset, textcoords="offset points", fontsize=8.3, color=colour, ha="right" if offset[0] else "left",
-        va="center", bbox=box, zorder=6,
+        text, (x, y), offset, textcoords="offset points", fontsize=8.3, color=colour,
+        ha="right" if offset[0] else "left", va="center", bbox=box, zorder=6,
     )  # fmt: skip
 
 

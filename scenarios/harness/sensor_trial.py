@@ -5,6 +5,7 @@ They run through the sensors that fly, `draw` of the modules and `Suite.measure`
 
 import math
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, ClassVar, Final
@@ -30,6 +31,7 @@ FLIGHTS: Final = 22  # of three axes: 66 hours at rest, of which the mean curve 
 HOUR_S: Final = 3600.0
 IMU_HZ: Final = 50
 SEED: Final = 0
+WORKERS: Final = 2
 SETTLED_S: Final = 12.0  # time given to a receiver, beside its own delays
 PHASES: Final = 8  # of a change between two reports
 REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: what a first-order lag reaches in its time constant
@@ -130,14 +132,20 @@ def at_rest(
     how, rates = INERTIAL[kind], Rates(imu_hz=IMU_HZ)
     if kind == "gyro":
         params = replace(params, drift_deg_s_min=0.0)  # a ramp is how a gyro warms up
-    noise = np.zeros(rates.ticks(seconds), list(how.module.NOISE))
-    m = allan.octaves(len(noise))
-    found = []
-    for flight in range(flights):
+    n = rates.ticks(seconds)
+    m = allan.octaves(n)
+
+    def record(flight: int) -> Array:
+        noise = np.zeros(n, list(how.module.NOISE))
         how.module.draw(params, BoardParams(), rates, partial(stream, SEED, flight), noise)
         signal = how.scale * (noise[how.columns[0]] + noise[how.columns[1]])
-        found.append(allan.variance(signal, m))
-        told()
+        return allan.variance(signal, m)
+
+    found = []
+    with ThreadPoolExecutor(WORKERS) as pool:  # random numbers are drawn outside Python's lock
+        for variances in pool.map(record, range(flights)):
+            found.append(variances)
+            told()
     tau_s, variances = m / IMU_HZ, np.concatenate(found, axis=1)
     hours = variances.shape[1] * seconds / 3600.0
     return AtRest(kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), stated(kind, params))
