@@ -87,7 +87,8 @@ class AtRest:
     """A gyro or an accelerometer that has lain still, before its converter and without warming up.
 
     tau_s : (n,)      variances : (n, axes), Allan variances in the square of `unit`
-    noise : fitted to their mean      stated : the noise of the data sheet, zero where that is silent
+    noise : fitted to their mean
+    figures : noise density, bias instability and random walk of the part file, zero where that is silent
     """
 
     kind: str
@@ -96,16 +97,23 @@ class AtRest:
     tau_s: Array
     variances: Array
     noise: allan.NoiseModel
-    stated: allan.NoiseModel
+    figures: tuple[float, float, float]
+
+    @property
+    def stated(self) -> allan.NoiseModel:
+        """The noise of `figures`."""
+        density, flicker, walk = self.figures
+        return allan.NoiseModel(density / math.sqrt(2.0), flicker, walk)
 
     @property
     def coefficients(self) -> dict[str, Coefficient]:
         """White noise, flicker noise, random walk, by their names in the JSON."""
-        m, d, unit = self.noise, self.stated, self.unit
+        m, unit = self.noise, self.unit
+        density, flicker, walk = (figure or None for figure in self.figures)
         return {
-            "noise_density": Coefficient(m.density, d.density or None, f"{unit}/sqrt(Hz)"),
-            "bias_instability": Coefficient(m.flicker, d.flicker or None, unit),
-            "rate_random_walk": Coefficient(m.walk, d.walk or None, f"{unit}/sqrt(s)"),
+            "noise_density": Coefficient(m.density, density, f"{unit}/sqrt(Hz)"),
+            "bias_instability": Coefficient(m.flicker, flicker, unit),
+            "rate_random_walk": Coefficient(m.walk, walk, f"{unit}/sqrt(s)"),
         }
 
     @property
@@ -148,14 +156,13 @@ def at_rest(
             told()
     tau_s, variances = m / IMU_HZ, np.concatenate(found, axis=1)
     hours = variances.shape[1] * seconds / 3600.0
-    return AtRest(kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), stated(kind, params))
+    return AtRest(kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), figures(kind, params))
 
 
-def stated(kind: str, params: Any) -> allan.NoiseModel:
-    """The noise that the parameters of a gyro or an accelerometer state, in the unit of the page."""
+def figures(kind: str, params: Any) -> tuple[float, float, float]:
+    """Noise density, bias instability and random walk of a gyro or an accelerometer, in the unit of the page."""
     how = INERTIAL[kind]
-    density, flicker, walk = (getattr(params, name) for name in (how.density, how.instability, how.walk))
-    return allan.NoiseModel(density / math.sqrt(2.0), flicker, walk)
+    return getattr(params, how.density), getattr(params, how.instability), getattr(params, how.walk)
 
 
 @dataclass(frozen=True, slots=True)

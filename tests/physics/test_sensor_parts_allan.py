@@ -12,7 +12,7 @@ import allantools
 import numpy as np
 import pytest
 
-from scenarios.harness.sensor_trial import FLIGHTS, HOUR_S, IMU_HZ, INERTIAL, SEED, stated
+from scenarios.harness.sensor_trial import FLIGHTS, HOUR_S, IMU_HZ, INERTIAL, SEED, figures
 from sim.clock import Rates
 from sim.rng import stream
 from sim.sensors.board import BoardParams
@@ -32,12 +32,6 @@ def drawn(kind, params, flight):
     how.module.draw(params, BoardParams(), rates, partial(stream, SEED, flight), noise)
     signal = how.scale * (noise[how.columns[0]] + noise[how.columns[1]])
     return signal - signal.mean(axis=0)
-
-
-def figures(kind, params):
-    """Noise density, bias instability and random walk of the part."""
-    how = INERTIAL[kind]
-    return [getattr(params, name) for name in (how.density, how.instability, how.walk)]
 
 
 @pytest.fixture(scope="module")
@@ -73,13 +67,13 @@ def test_part_has_the_noise_its_file_states(variances, kind, name):
     variance of means over 100 s, 36 of them in an hour, scatters by 3 % over 66 hours, and B by half that over the
     share that flicker noise has in it.
     """
-    noise, found = stated(kind, PARTS[kind][name]), variances[kind, name]
-    assert noise.white > 0.0
-    walk = noise.walk**2 * TAU_S / 3.0
-    flicker = 2.0 * math.log(2.0) / math.pi * noise.flicker**2
+    (density, flicker_figure, walk_figure), found = figures(kind, PARTS[kind][name]), variances[kind, name]
+    assert density > 0.0
+    white_2, walk = density**2 / 2.0, walk_figure**2 * TAU_S / 3.0
+    flicker = 2.0 * math.log(2.0) / math.pi * flicker_figure**2
     white = math.sqrt((found[0] - flicker - walk[0]) * TAU_S[0])
-    assert white == pytest.approx(noise.white, rel=0.05)
-    if noise.flicker > 0.0:
-        at = int(np.argmax(flicker / (noise.white**2 / TAU_S + flicker + walk)))
-        B = math.sqrt((found[at] - noise.white**2 / TAU_S[at] - walk[at]) * math.pi / (2.0 * math.log(2.0)))
-        assert B == pytest.approx(noise.flicker, rel=0.10)
+    assert math.sqrt(2.0) * white == pytest.approx(density, rel=0.05)
+    if flicker_figure > 0.0:
+        at = int(np.argmax(flicker / (white_2 / TAU_S + flicker + walk)))
+        instability = math.sqrt((found[at] - white_2 / TAU_S[at] - walk[at]) * math.pi / (2.0 * math.log(2.0)))
+        assert instability == pytest.approx(flicker_figure, rel=0.10)
