@@ -22,7 +22,7 @@ from sim.sensors.fitting import own_files
 
 Chance = Literal["random"]
 Triple = tuple[float, float, float]
-Figure = float | bool | str | Triple  # what a field of a sensor can be; the dataclass says which
+Figure = float | bool | str | tuple[float, ...]  # what a field of a sensor can be; the dataclass says which
 
 
 class _Model(BaseModel):
