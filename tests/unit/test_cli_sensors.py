@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,9 @@ def test_own_part_without_bias_instability_has_none_stated(short, tmp_path):
     assert 0.0 <= instability["measured"] < 0.02
 
 
-@pytest.mark.parametrize(("name", "ending"), [("apm2", "png"), ("itg3200", "svg"), ("hmc5843", "pdf"), ("ls20031", "png")])
+@pytest.mark.parametrize(
+    ("name", "ending"), [("apm2", "png"), ("itg3200", "svg"), ("hmc5843", "pdf"), ("ls20031", "png")]
+)
 def test_picture_is_drawn(short, tmp_path, name, ending):
     """Every sensor there is, in every format."""
     path = tmp_path / f"page.{ending}"
@@ -172,3 +175,16 @@ def test_sigma_of_a_sample_is_what_the_density_makes_at_50_hz():
     rest = sensor_trial.at_rest("gyro", GENERIC["gyro"], flights=2, seconds=600.0)
     expected = GENERIC["gyro"].noise_density_deg_s_sqrt_hz * math.sqrt(Rates().imu_hz / 2.0)
     assert rest.sample_sigma == pytest.approx(expected, rel=0.02)
+
+
+def test_manual_lists_every_part_and_suite_and_its_examples_can_be_flown(tmp_path):
+    """docs/sensors.md: the tables are complete, and the part and the suite of one's own are accepted as written."""
+    manual = (Path(__file__).parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
+    missing = [name for name in [*part_names(), *SUITES] if f"| `{name}` |" not in manual]
+    assert not missing
+    part, suite = re.findall(r"```toml\n(.*?)```", manual, re.DOTALL)
+    (tmp_path / "my_gyro.toml").write_text(part)
+    (tmp_path / "my_board.toml").write_text(suite)
+    subject = sensor_names.subject(str(tmp_path / "my_board.toml"))
+    assert subject.devices["gyro"].noise_density_deg_s_sqrt_hz == 0.01
+    assert subject.members["gps"] == "ls20031"
