@@ -16,7 +16,7 @@ def hard_iron_from_extremes(field_b_ut: Array) -> Array:
 
     Right where in the sweep every axis has pointed along the field and against it, or as near to the one as to the
     other.  Where an axis has missed the two by the angles a and b, the answer is wrong by
-    |B| (cos b - cos a) / 2; noise of sigma s adds about as much as s.
+    |B| (cos a - cos b) / 2; noise of sigma s adds about half of s.
 
     Parameters
     ----------

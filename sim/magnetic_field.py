@@ -1,6 +1,6 @@
 """The earth's magnetic field at a place and a date: the World Magnetic Model.
 
-NOAA and BGS, "The US/UK World Magnetic Model for 2025-2030", 2024: a spherical harmonic expansion of degree 12
+NOAA and BGS, "The US/UK World Magnetic Model for 2025-2030" (WMM2025): a spherical harmonic expansion of degree 12
 with a linear change in time.  It knows the core's field alone; rocks and steel nearby add their own.
 """
 
@@ -19,7 +19,7 @@ def require_year(owner: str, year: float) -> None:
     """Refuse a date that the model does not cover: ValueError."""
     if not FIRST_YEAR <= year <= LAST_YEAR:
         raise ValueError(
-            f"{owner} = {year!r}: the world magnetic model covers {FIRST_YEAR:g} to {LAST_YEAR:g}; choose a year in it"
+            f"{owner} = {year!r} (decimal): choose {FIRST_YEAR:g} to {LAST_YEAR:g}, the world magnetic model's years"
         )
 
 

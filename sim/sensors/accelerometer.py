@@ -1,6 +1,6 @@
 """Accelerometer: bias, noise, saturation and quantisation on the specific force at the centre of gravity.
 
-reading = convert(f + bias(t) + noise)
+reading = convert(supply(curve(M f) + bias(t) + noise)),   M = (1 + diag(gain) + cross-axis) R_sb
 bias(t) = turn-on + slope x warming(t) + flicker noise + random walk
 
 `f` is acceleration minus gravity, mean over the tick: level at rest (0, 0, -g).
@@ -156,8 +156,8 @@ def feel_force(truth, k, unit, board, memory, state):  # type: ignore[no-untyped
     Of the force the truth holds means alone, h apart.  In a tick it is taken as the straight line with that mean
     and the rise since the mean of the tick before.  With x from mid-tick a force f(t) errs from that line by
     (x^2 + h x - h^2 / 12) / 2 times its second derivative.  That has no mean, and while it stays the same it leaves
-    no error in the means behind the filter: theirs is at most h^3 / 24 times the largest third derivative, to the
-    next power of h, for a filter far slower than a tick, and less for a faster one.
+    no error in the means behind the filter: theirs is at most h^3 / 23 times the largest third derivative, to the
+    next power of h, whatever the bandwidth.
     """
     signal = memory.signal
     for i in range(3):

@@ -101,7 +101,8 @@ def make(params: BoardParams, rates: Rates, source: Source, unit: NDArray[np.voi
     """Make one board: draw its supply and set its constants in `unit`, shape (1,) of UNIT."""
     unit["dt_s"] = rates.dt_s
     unit["lever_arm_b_m"] = params.lever_arm_b_m
-    unit["supply"] = 1.0 + params.supply_tolerance * source("board supply").standard_normal()
+    wrong = params.supply_tolerance * source("board supply").standard_normal() if params.supply_tolerance else 0.0
+    unit["supply"] = 1.0 + wrong
     for name in ("supply_sag", "warming_k", "warming_s"):
         unit[name] = getattr(params, name)
     unit["shaken_at_hz"] = params.vibration_rpm / 60.0
@@ -122,7 +123,7 @@ def attend(truth, k, unit, memory):  # type: ignore[no-untyped-def]
     The rotor's speed in the tick is the mean of those at its ends.
     """
     row = truth[k]
-    memory.warmer_k = -unit.warming_k * np.expm1(-row.t_s / unit.warming_s)
+    memory.warmer_k = -unit.warming_k * np.expm1(-row.t_s / unit.warming_s)  # as `warming`
     memory.supply = unit.supply - unit.supply_sag * row.throttle
     rpm = 0.5 * (row.rotor_rpm + truth[k - 1].rotor_rpm) if k > 0 else row.rotor_rpm
     memory.rotor_hz = rpm / 60.0

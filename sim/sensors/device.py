@@ -106,20 +106,21 @@ def make(
 ) -> None:  # fmt: skip
     """Fill what is in DEVICE of `unit`, shape (1,), for the part `name`; the keywords are in SI units."""
 
-    def drawn(what: str, n: int = 3) -> Array:
-        return source(f"{name} {what}").standard_normal(n)
+    def drawn(what: str, sigma: float, n: int = 3) -> Array:
+        return sigma * source(f"{name} {what}").standard_normal(n) if sigma else np.zeros(n)
 
-    M = np.diag(1.0 + params.gain * drawn("gain"))
-    M[~np.eye(3, dtype=bool)] = params.cross_axis * drawn("cross-axis", 6)
+    M = np.diag(1.0 + drawn("gain", params.gain))
+    M[~np.eye(3, dtype=bool)] = drawn("cross-axis", params.cross_axis, 6)
     unit["M"] = M @ axes(board.mounting_deg)
     unit["bandwidth_hz"], unit["filters"] = params.bandwidth_hz, math.isfinite(params.bandwidth_hz)
     if math.isfinite(params.bandwidth_hz):
         unit["low_pass"] = low_pass(params.bandwidth_hz, rates.dt_s)
     unit["shakes"], unit["shake"], unit["conversions"] = shake > 0.0, shake, params.conversions
-    unit["shake_rad"] = source(f"{name} vibration").uniform(0.0, 2.0 * math.pi, 3)
-    unit["gain_per_k"] = params.gain_per_k * drawn("gain temperature")
+    if shake:
+        unit["shake_rad"] = source(f"{name} vibration").uniform(0.0, 2.0 * math.pi, 3)
+    unit["gain_per_k"] = drawn("gain temperature", params.gain_per_k)
     if math.isfinite(full_scale):  # a fraction of no full scale is nothing
-        unit["bend"] = params.nonlinearity * full_scale * drawn("non-linearity")
+        unit["bend"] = drawn("non-linearity", params.nonlinearity * full_scale)
     unit["supply_power"] = board.supply_power(params.output)
     unit["null"], unit["range"] = null, full_scale
     unit["distorts"] = np.any(unit["gain_per_k"]) or np.any(unit["bend"]) or np.any(unit["supply_power"])

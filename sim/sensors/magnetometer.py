@@ -7,7 +7,7 @@ mounting and M the part's own gains and cross axes (the model of Vasconcelos et 
 magnetometer calibration in sensor frame", IEEE Trans. Aerospace and Electronic Systems 47, 2011, and the motor).
 
 A current's field is in proportion to it (Biot and Savart), a direct-current motor's torque too, and a propeller's
-torque to the square of its speed.
+torque to the square of its speed; a propeller that windmills is taken for a driven one.
 
 Sample j is true at step j * steps_per_sample of the physics (the field is interpolated between two ticks, wrong by
 at most an eighth of the squared angle turned in a tick) and arrives in the first tick that ends at least the
