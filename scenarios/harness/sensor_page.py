@@ -20,7 +20,6 @@ from scenarios.harness.sensor_trial import (
 )
 from sim.log import Log
 from sim.params import unit_of, words_of
-from sim.sensors.noise import step_of
 
 FORMATS: Final = (".png", ".svg", ".pdf")
 DRIFT_S: Final = 60.0
@@ -138,20 +137,18 @@ def _inertial_effects(kind: str, params: Any, rest: AtRest) -> list[Row]:
     """Of a gyro or an accelerometer, in the unit of its full scale."""
     rows: list[Row]
     if kind == "gyro":
-        step = params.step_deg_s or step_of(params.range_deg_s, params.bits)
         rows = [
             ("sigma of a sample", rest.sample_sigma, "deg/s"),
-            ("step of the converter", step, "deg/s"),
+            ("step of a reading", rest.step, "deg/s"),
             ("full scale", params.range_deg_s, "deg/s"),
             (f"angle after {DRIFT_S:.0f} s, white noise alone", rest.noise.white * math.sqrt(DRIFT_S), "deg"),
             (f"angle after {DRIFT_S:.0f} s, turn-on bias", params.bias_deg_s * DRIFT_S, "deg"),
         ]
     else:
-        step = params.step_g or step_of(params.range_g, params.bits)
         tilt_deg = math.degrees(math.atan(1e-6 * rest.sample_sigma))
         rows = [
             ("sigma of a sample", 1e-3 * rest.sample_sigma, "mg"),
-            ("step of the converter", 1e3 * step, "mg"),
+            ("step of a reading", 1e-3 * rest.step, "mg"),
             ("full scale", params.range_g, "g"),
             ("tilt read from a sample, sigma", tilt_deg, "deg"),
             ("tilt read from 1 s, sigma", math.degrees(math.atan(1e-6 * rest.noise.white)), "deg"),
@@ -178,7 +175,7 @@ def _magnetic_effects(params: Any, trial: MagneticTrial) -> list[Row]:
     return [
         ("sample rate", params.rate_hz, "Hz"),
         ("sigma of a sample", params.noise_ut, "uT"),
-        ("step of the converter", params.step_ut, "uT"),
+        ("step of a reading", params.step_ut, "uT"),
         ("horizontal field at the launch point", horizontal, "uT"),
         ("heading by the noise of a sample, sigma", math.degrees(math.atan(params.noise_ut / horizontal)), "deg"),
         ("heading by one step", math.degrees(math.atan(params.step_ut / horizontal)), "deg"),
@@ -192,7 +189,7 @@ def _air_effects(kind: str, params: Any, trial: AirTrial) -> list[Row]:
     return [
         ("sample rate", params.rate_hz, "Hz"),
         ("sigma of a sample", params.noise_pa, "Pa"),
-        ("step of the converter", params.step_pa, "Pa"),
+        ("step of a reading", params.step_pa, "Pa"),
         (f"{what} read too much, mean", float(errors.mean()), unit),
         (f"{what}, scatter about that", float(errors.std()), unit),
     ]

@@ -89,6 +89,7 @@ class AtRest:
     tau_s : (n,)      variances : (n, axes), Allan variances in the square of `unit`
     noise : fitted to their mean
     figures : noise density, bias instability and random walk of the part file, zero where that is silent
+    step : of a reading, the averaging of conversions included; 0 where nothing is quantised
     """
 
     kind: str
@@ -98,6 +99,7 @@ class AtRest:
     variances: Array
     noise: allan.NoiseModel
     figures: tuple[float, float, float]
+    step: float
 
     @property
     def stated(self) -> allan.NoiseModel:
@@ -156,13 +158,22 @@ def at_rest(
             told()
     tau_s, variances = m / IMU_HZ, np.concatenate(found, axis=1)
     hours = variances.shape[1] * seconds / 3600.0
-    return AtRest(kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), figures(kind, params))
+    return AtRest(
+        kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), figures(kind, params), step(kind, params)
+    )
 
 
 def figures(kind: str, params: Any) -> tuple[float, float, float]:
     """Noise density, bias instability and random walk of a gyro or an accelerometer, in the unit of the page."""
     how = INERTIAL[kind]
     return getattr(params, how.density), getattr(params, how.instability), getattr(params, how.walk)
+
+
+def step(kind: str, params: Any) -> float:
+    """Step of a reading, in the unit of the page, as the part is made."""
+    how, unit = INERTIAL[kind], np.zeros(1, INERTIAL[kind].module.UNIT)
+    how.module.make(params, BoardParams(), Rates(imu_hz=IMU_HZ), partial(stream, SEED, 0), unit)
+    return how.scale * float(unit["step"][0])
 
 
 @dataclass(frozen=True, slots=True)

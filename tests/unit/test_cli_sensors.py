@@ -188,3 +188,9 @@ def test_manual_lists_every_part_and_suite_and_its_examples_can_be_flown(tmp_pat
     subject = sensor_names.subject(str(tmp_path / "my_board.toml"))
     assert subject.devices["gyro"].noise_density_deg_s_sqrt_hz == 0.01
     assert subject.members["gps"] == "ls20031"
+
+
+def test_step_of_a_reading_is_that_of_the_data_sheet():
+    """ITG-3200: 14.375 counts per deg/s (PS-ITG-3200A-00-01.4, section 3.1)."""
+    gyro = sensor_names.subject("itg3200").devices["gyro"]
+    assert sensor_trial.step("gyro", gyro) == pytest.approx(1.0 / 14.375, rel=1e-4)
