@@ -25,6 +25,12 @@ def unit_of(name: str) -> str:
     return next((unit for end, unit in _UNITS if name.endswith(end)), "")
 
 
+def words_of(name: str) -> str:
+    """What a field's name says besides its unit, as words: ``noise_density_ug_sqrt_hz`` is noise density."""
+    end = next((end.removeprefix("noise_density") for end, _ in _UNITS if name.endswith(end)), "")
+    return (name if end == "bits" else name.removesuffix(end)).replace("_", " ")
+
+
 def near_misses(name: str, names: Iterable[str]) -> str:
     """The end of a message about an unknown `name`: what it may have meant, or all there is."""
     possible = sorted(names)

@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | bench | aircraft | export | view``.
+"""The command line: ``wingslevel list | fly | check | bench | aircraft | sensors | export | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -264,6 +264,42 @@ def aircraft(
                 handbook_picture.draw(book, picture)
         report(book.to_json())
         handbook.tell(book)  # last: a reader who closes the pipe loses no file
+
+
+@app.command()
+def sensors(
+    part: Annotated[
+        str | None, typer.Argument(help="Name of a part or of a suite, or part.toml with one's own; all, where none.")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
+    json_: JsonOption = None,
+) -> None:
+    """What sensors there are, or the page of one: its data sheet, its Allan deviation, what it does to a signal."""
+    from scenarios.harness import sensor_names
+
+    with _reporting(json_) as report:
+        if part is None:
+            if picture is not None:
+                raise _refusal(f"--picture {picture}: name the part or the suite to draw")
+            report(sensor_names.to_json())
+            sensor_names.tell()
+            return
+        from scenarios.harness import sensor_page
+
+        with usage():
+            _check_file(picture)
+            sensor_page.check_picture(picture)
+            subject = sensor_names.subject(part)
+        console.warn_if_cold()
+        with console.progress("lying still", "axis-hours") as advance:
+            page = sensor_page.make(subject, advance)
+        if picture is not None:
+            from scenarios.harness import sensor_picture
+
+            with usage():
+                sensor_picture.draw(page, picture)
+        report(page.to_json())
+        sensor_page.tell(page)  # last: a reader who closes the pipe loses no file
 
 
 @app.command()

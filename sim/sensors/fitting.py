@@ -79,6 +79,12 @@ def own_files(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
     return {name: read_text(Path(name), files, "sensor suite")} | kept
 
 
+def suite_parts(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
+    """What is in the suite `name` or in a file, as it is written there: kind -> part, and its summary."""
+    _, data = _read(name, files)
+    return {key: data[key] for key in ("summary", *KINDS) if key in data}
+
+
 class _Suites(Mapping[str, SuiteParams]):
     """The suites that have a file here, each read when it is first asked for."""
 
