@@ -67,6 +67,18 @@ ImuRateOption = Annotated[
     int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
 ]
 SensorsOption = Annotated[str | None, typer.Option("--sensors", help="Name of a sensor suite.")]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        metavar="CHANNEL:KIND[=VALUE]@S[-S]",
+        help="gyro.x:stuck@20-25, gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, east); s after the "
+        "release; repeat it. CHANNEL: gyro, accelerometer, magnetometer (.x, .y, .z), airspeed, barometer, gps. KIND: "
+        "stuck, nan, spikes=AMPLITUDE,SHARE, and but for gps dropout, bias, gain=0.5, saturated=1 or -1, for gps "
+        "outage, jump=50, frozen_course. Where not given bias is 5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes are 200 "
+        "deg/s, 2 g in 2% of the readings, 50 uT, 10 m/s, 50 m in 10%.",
+    ),
+]
 JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
@@ -143,6 +155,7 @@ def fly(
     gps_rate: GpsRateOption = None,
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
+    fault: FaultOption = None,
     duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the flight after the release.")] = None,
     seed: Annotated[
         int | None, typer.Option(help="Another seed, another flight; the same seed, the same bits. [default: 0]")
@@ -157,7 +170,7 @@ def fly(
     """Fly a scenario once, record it, judge it."""
     from scenarios.harness import single, viewing
 
-    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors) | _given(
+    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault) | _given(
         {"estimator": estimator, "duration_s": duration, "seed": seed}
     )
     with _reporting(json_) as report:
@@ -186,6 +199,7 @@ def check(
     gps_rate: GpsRateOption = None,
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
+    fault: FaultOption = None,
     set_: SetOption = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
@@ -199,7 +213,7 @@ def check(
         with usage():
             for path in (junit, markdown):
                 _check_file(path)
-            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors)
+            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
@@ -288,11 +302,12 @@ def _changes(assignments: list[str] | None) -> dict[str, Any]:
 
 
 def _fitted(
-    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None
-) -> dict[str, Any]:
-    """What flies and what it carries, by the names of the configuration."""
+    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None,
+    faults: list[str] | None,
+) -> dict[str, Any]:  # fmt: skip
+    """What flies, what it carries and what of that fails, by the names of the configuration."""
     named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
-    return _given(named | {"suite": suite})
+    return _given(named | {"suite": suite, "faults": faults or None})
 
 
 def _given(named: dict[str, Any]) -> dict[str, Any]:

@@ -9,10 +9,11 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from scenarios.harness.air_config import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.air_config import parse_wind, resolve_air
+from scenarios.harness.fault_config import require_fitted, require_in_flight, typed_faults
 from scenarios.harness.fitted import dotted_fields, suite_params
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.validation import validated
@@ -100,6 +101,7 @@ class FlightConfig(_Model):
     estimator_params : fields of the estimator's parameter dataclass
     duration_s : after the release          suite, sensors : name of the suite, and fields changed in it by their
     dotted names, ``{"gps.latency_s": 1.0}``            manoeuvre : the scenario's own parameters
+    faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
     box_radius_m, box_height_m : of the cylinder around the launch point; beyond it the flight is over
     seed, flight : campaign and number of the flight in it, which name the random streams
     """
@@ -112,6 +114,7 @@ class FlightConfig(_Model):
     rates: RatesConfig = Field(default_factory=RatesConfig)
     suite: str = "generic"
     sensors: dict[str, float] = Field(default_factory=dict)
+    faults: tuple[str, ...] = ()
     air: AirConfig = Field(default_factory=AirConfig)
     start: Annotated[InFlightStart | HandThrowStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
@@ -119,6 +122,18 @@ class FlightConfig(_Model):
     box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
     seed: int = Field(default=0, ge=0)
     flight: int = Field(default=0, ge=0)
+
+    @field_validator("faults", mode="before")
+    @classmethod
+    def _typed_faults(cls, faults: Any) -> Any:
+        return typed_faults(faults)
+
+    @model_validator(mode="after")
+    def _faults_in_flight(self) -> "FlightConfig":
+        start = self.start
+        held_s = start.hold_s + start.push_s if isinstance(start, HandThrowStart) else 0.0
+        require_in_flight(self.faults, held_s, self.duration_s)
+        return self
 
     @property
     def heading_deg(self) -> float:
@@ -147,7 +162,8 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
         else:
             _put(data, _full_name(name, config), value)
     changed = validated(FlightConfig, data)
-    suite_params(changed.suite, changed.sensors)  # refuses a suite or a value that cannot be
+    # Refuses a suite, a value or a fault that cannot be.
+    require_fitted(changed.faults, suite_params(changed.suite, changed.sensors))
     return changed
 
 
