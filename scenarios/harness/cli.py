@@ -71,12 +71,12 @@ FaultOption = Annotated[
     list[str] | None,
     typer.Option(
         "--fault",
-        metavar="CHANNEL:KIND[=VALUE]@S[-S]",
-        help="gyro.x:stuck@20-25, gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, east); s after the "
-        "release; repeat it. CHANNEL: gyro, accelerometer, magnetometer (.x, .y, .z), airspeed, barometer, gps. KIND: "
-        "stuck, nan, spikes=AMPLITUDE,SHARE, and but for gps dropout, bias, gain=0.5, saturated=1 or -1, for gps "
-        "outage, jump=50, frozen_course. Where not given bias is 5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes are 200 "
-        "deg/s, 2 g in 2% of the readings, 50 uT, 10 m/s, 50 m in 10%.",
+        metavar="FAULT",
+        help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
+        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
+        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
+        "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
+        "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
     ),
 ]
 JsonOption = Annotated[

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from scenarios.harness.air_config import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.air_config import parse_wind, resolve_air
-from scenarios.harness.fault_config import require_fitted, require_in_flight, typed_faults
+from scenarios.harness.fault_config import require_fitted, typed_faults
 from scenarios.harness.fitted import dotted_fields, suite_params
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.validation import validated
@@ -128,13 +128,6 @@ class FlightConfig(_Model):
     def _typed_faults(cls, faults: Any) -> Any:
         return typed_faults(faults)
 
-    @model_validator(mode="after")
-    def _faults_in_flight(self) -> "FlightConfig":
-        start = self.start
-        held_s = start.hold_s + start.push_s if isinstance(start, HandThrowStart) else 0.0
-        require_in_flight(self.faults, held_s, self.duration_s)
-        return self
-
     @property
     def heading_deg(self) -> float:
         """Heading at the start; ValueError where it has not been drawn yet."""
@@ -142,6 +135,11 @@ class FlightConfig(_Model):
         if isinstance(heading_deg, str):
             raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
         return heading_deg
+
+    @property
+    def held_s(self) -> float:
+        """From power-up to the release."""
+        return self.start.hold_s + self.start.push_s if isinstance(self.start, HandThrowStart) else 0.0
 
 
 def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig:

@@ -5,7 +5,8 @@ gain compose, and a reading that is stuck is the one last reported before its wi
 a sensor that reports now and then (GPS, magnetometer, air data) acts on the reports that arrive in its window and
 leaves what is held between them alone.
 
-stuck           repeats what was last reported before the window; a GPS repeats its fix with new stamps
+stuck           repeats what was last reported before the window; a GPS repeats its fix with new stamps, and brings
+                none where it had none
 dropout         nothing answers: gyro, accelerometer and air data read zero, a magnetometer brings no new sample
 outage          the same for a GPS: no new fix, the last good one is held
 nan             what arrives is no number
@@ -13,7 +14,7 @@ spikes          a share of the readings is off by an amplitude, up or down; of a
 bias, gain      readings are off by an amount, or multiplied by a factor
 saturated       reads its full scale
 jump            the position of the fixes is displaced
-frozen_course   fixes keep the course last reported, and their velocity points along it
+frozen_course   fixes keep the course last reported, 0 before the first, and their velocity points along it
 
 A reading that is off stays within the full scale of its part.
 """
@@ -216,7 +217,7 @@ def fault_table(
         least, most = _span(fault.part, getattr(suite, fault.part), unit)
         kind = Kind[fault.kind.upper()]
         if kind is Kind.SATURATED:
-            values = np.where(values > 0.0, most, least)  # noqa: PLW2901 - what the sign stands for
+            values = np.where(values > 0.0, most, least)
         wrong = table[first:end, j]
         # A spike is a tick in which something is wrong, and so is every tick of the other kinds.
         wrong["kind"] = np.where(values[first:end] == 0.0, 0, kind) if kind is Kind.SPIKES else kind
@@ -244,6 +245,8 @@ def _columns(fault: Fault, source: Source, n: int) -> list[tuple[Fault, int, Arr
         azimuth = 2.0 * np.pi * draws[:, 1:2]
         ways = np.hstack([np.cos(azimuth), np.sin(azimuth)]) if fault.part == "gps" else np.sign(draws[:, 1:] - 0.5)
         return [(fault, axis, hit[:, 0] * ways[:, axis]) for axis in axes]
+    if fault.kind == "dropout" and fault.part == "magnetometer":
+        axes = [0]  # its sample is lost as a whole
     value = fault.values[0] if fault.values else 0.0
     si = part.si if fault.kind == "bias" else 1.0
     return [(fault, axis, np.full(n, value * si)) for axis in axes]
@@ -282,7 +285,8 @@ def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
         elif fault.part == _MAGNETOMETER and row.mag_new:
             if fault.kind == Kind.DROPOUT:
                 row.mag_new = 0
-                row.mag_b_ut[i] = measured[k - 1].mag_b_ut[i] if k > 0 else 0.0
+                for axis in range(3):
+                    row.mag_b_ut[axis] = measured[k - 1].mag_b_ut[axis] if k > 0 else 0.0
             else:
                 row.mag_b_ut[i] = _wrong(row.mag_b_ut[i], before.mag_b_ut[i], fault)
         elif fault.part == _AIRSPEED and row.air_new:
@@ -319,25 +323,23 @@ def _wrong_bias(bias, fault):  # type: ignore[no-untyped-def]
 @kernel
 def _spoil_fix(measured, k, fault):  # type: ignore[no-untyped-def]
     """Do to the fix that has arrived in row `k` what is wrong with it; the columns hold it until the next."""
-    row = measured[k]
-    if fault.kind == Kind.OUTAGE:
-        row.gps_new = 0
-        _take_fix(measured[k - 1], row)  # no fix is so early that it arrives in the very first row
-        row.gps_valid, row.gps_t_s = measured[k - 1].gps_valid, measured[k - 1].gps_t_s
+    row, before = measured[k], measured[fault.before]
+    if fault.kind == Kind.OUTAGE or (fault.kind == Kind.STUCK and not before.gps_valid):
+        last = measured[k - 1]  # no fix is so early that it arrives in the very first row
+        row.gps_new, row.gps_valid, row.gps_t_s = 0, last.gps_valid, last.gps_t_s
+        _take_fix(last, row)
+    elif fault.kind == Kind.STUCK:
+        _take_fix(before, row)
     elif fault.kind == Kind.NAN:
         for i in range(3):
             row.gps_p_e_m[i] = row.gps_v_e_m_s[i] = np.nan
         row.gps_course_rad = row.gps_speed_m_s = np.nan
-    elif fault.kind == Kind.JUMP or fault.kind == Kind.SPIKES:
+    elif fault.kind == Kind.FROZEN_COURSE:
+        row.gps_course_rad = before.gps_course_rad
+        row.gps_v_e_m_s[0] = row.gps_speed_m_s * np.cos(row.gps_course_rad)
+        row.gps_v_e_m_s[1] = row.gps_speed_m_s * np.sin(row.gps_course_rad)
+    else:  # a jump, or one spike
         row.gps_p_e_m[fault.axis] += fault.value
-    else:  # repeats the fix before the window; the first in it, where there was none before
-        last = measured[fault.before if measured[fault.before].gps_valid else max(k - 1, 0)]
-        if last.gps_valid and fault.kind == Kind.STUCK:
-            _take_fix(last, row)
-        elif last.gps_valid:
-            row.gps_course_rad = last.gps_course_rad
-            row.gps_v_e_m_s[0] = row.gps_speed_m_s * np.cos(row.gps_course_rad)
-            row.gps_v_e_m_s[1] = row.gps_speed_m_s * np.sin(row.gps_course_rad)
 
 
 @kernel
