@@ -1,6 +1,7 @@
 """Accelerometer: bias, noise, saturation and quantisation on the specific force at the centre of gravity.
 
-reading = convert(f + bias + noise)
+reading = convert(f + bias(t) + noise)
+bias(t) = turn-on + slope x warming(t) + flicker noise + random walk
 
 `f` is acceleration minus gravity, mean over the tick: level at rest (0, 0, -g).
 """
@@ -13,12 +14,15 @@ from numpy.typing import NDArray
 
 from estimator.jit import kernel
 from sim.clock import Rates
-from sim.sensors.board import BoardParams
+from sim.sensors.board import BoardParams, warming
 from sim.sensors.noise import (
+    FLICKER_TIMES_S,
     STANDARD_GRAVITY_M_S2,
     Output,
     Source,
     convert,
+    flicker,
+    random_walk,
     require,
     require_converter,
     require_device,
@@ -35,8 +39,8 @@ class AccelerometerParams:
 
     bias_g : sigma of the bias, constant in a flight
     bias_per_k_mg : sigma of the change of the bias with temperature, mg per kelvin
-    bias_instability_ug : floor of the Allan deviation, flicker noise's coefficient B of IEEE Std 952
-    walk_ug_sqrt_s : the bias walks at random, sigma after one second
+    bias_instability_ug : flicker noise's coefficient B of IEEE Std 952; alone it has an Allan deviation of 0.664 B
+    walk_ug_sqrt_s : the bias walks at random, sigma after one second, ug per root second
     noise_density_ug_sqrt_hz : one-sided spectral density of the white noise, as data sheets give it
     gain : sigma of the relative gain error        gain_per_k : sigma of its change with temperature, 1/K
     nonlinearity : sigma of the largest deviation from the straight line, as a fraction of the full scale
@@ -93,12 +97,25 @@ def draw(
     params: AccelerometerParams, board: BoardParams, rates: Rates, source: Source, noise: NDArray[np.void]
 ) -> None:
     """Draw bias and noise of every tick of a flight into the columns NOISE of `noise`, shape (n,)."""
-    bias_g = params.bias_g * source("accelerometer bias").standard_normal(3)
-    white = source("accelerometer noise").standard_normal((len(noise), 3))
+    n, dt_s = len(noise), rates.dt_s
+    bias_g = np.zeros(3)
+    if params.bias_g:
+        bias_g = bias_g + params.bias_g * source("accelerometer bias").standard_normal(3)
+    if params.bias_per_k_mg and board.warming_k:
+        slope_g_k = 1e-3 * params.bias_per_k_mg * source("accelerometer bias per kelvin").standard_normal(3)
+        t_s = np.arange(1, n + 1, dtype=np.float64)[:, None] * dt_s
+        bias_g = bias_g + slope_g_k * warming(board, t_s)
+    if params.bias_instability_ug:
+        steps = source("accelerometer flicker").standard_normal((n, len(FLICKER_TIMES_S), 3))
+        bias_g = bias_g + flicker(steps, 1e-6 * params.bias_instability_ug, dt_s)
+    if params.walk_ug_sqrt_s:
+        steps = source("accelerometer walk").standard_normal((n, 3))
+        bias_g = bias_g + random_walk(steps, 1e-6 * params.walk_ug_sqrt_s, dt_s)
     noise["force_bias_b_m_s2"] = bias_g * STANDARD_GRAVITY_M_S2
-    noise["force_noise_b_m_s2"] = (
-        sample_sigma(1e-6 * params.noise_density_ug_sqrt_hz, rates.imu_hz) * STANDARD_GRAVITY_M_S2 * white
-    )
+    noise["force_noise_b_m_s2"] = 0.0
+    if params.noise_density_ug_sqrt_hz:
+        sigma_m_s2 = sample_sigma(1e-6 * params.noise_density_ug_sqrt_hz, rates.imu_hz) * STANDARD_GRAVITY_M_S2
+        noise["force_noise_b_m_s2"] = sigma_m_s2 * source("accelerometer noise").standard_normal((n, 3))
 
 
 @kernel

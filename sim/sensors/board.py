@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.interface import Array
 from sim.sensors.noise import require
 
 Triple = tuple[float, float, float]
@@ -43,6 +44,14 @@ class BoardParams:
         require(self, "g", "vibration_g")
         require(self, "deg/s", "vibration_deg_s")
         require(self, "rpm", "vibration_rpm", least=1.0)
+
+
+def warming(params: BoardParams, t_s: Array) -> Array:
+    """How much warmer than at power-up the parts are `t_s` later, K: a body that takes up a constant power.
+
+    Newton's law of cooling: dT/dt = (warming_k - T) / warming_s, T(0) = 0.
+    """
+    return -params.warming_k * np.expm1(-t_s / params.warming_s)
 
 
 UNIT = np.dtype([("lever_arm_b_m", "f8", (3,))], align=True)

@@ -33,6 +33,7 @@ from estimator.interface import Array
 from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Source, convert
+from sim.sensors.receiver import hold
 
 LATEST_S: Final = 36000.0
 
@@ -72,7 +73,13 @@ _PARTS: Final = {
     "barometer": _Part(_BAROMETER, "m", 1.0, 1, 10.0, (50.0, 0.1)),
     "gps": _Part(_GPS, "m", 1.0, 1, 0.0, (50.0, 0.1)),
 }
-_FULL_SCALES: Final = {"gyro": "range_deg_s", "accelerometer": "range_g", "magnetometer": "range_ut"}
+_FULL_SCALES: Final = {
+    "gyro": "range_deg_s",
+    "accelerometer": "range_g",
+    "magnetometer": "range_ut",
+    "airspeed": "range_pa",
+}
+_AIR: Final = ("airspeed", "barometer")
 _OF_READINGS: Final = ("stuck", "dropout", "nan", "spikes", "bias", "gain", "saturated")
 _OF_FIXES: Final = ("outage", "jump", "frozen_course", "stuck", "nan", "spikes")
 CHANNELS: Final = tuple(
@@ -176,13 +183,8 @@ def require_possible(fault: Fault, suite: Any) -> None:
     part = getattr(suite, fault.part)
     if part is None:
         raise ValueError(f"fault {fault}: no {fault.part} is fitted; choose a suite that has one")
-    if fault.kind == "saturated" and not math.isfinite(_full_scale(fault.part, part)):
+    if fault.kind == "saturated" and not math.isfinite(getattr(part, _FULL_SCALES.get(fault.part, ""), math.inf)):
         raise ValueError(f"fault {fault}: this {fault.part} has no full scale; choose another suite, or bias")
-
-
-def _full_scale(name: str, part: Any) -> float:
-    """Full scale of a part from its parameters, in the unit of its faults; infinite where it has none."""
-    return float(getattr(part, _FULL_SCALES.get(name, ""), math.inf))
 
 
 FAULT = np.dtype(
@@ -201,12 +203,12 @@ NO_FAULTS = np.zeros((0, 0), FAULT)
 
 
 def fault_table(
-    faults: Sequence[Fault], suite: Any, release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
+    faults: Sequence[Fault], release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
 ) -> NDArray[np.void]:
     """What is wrong in each of `n` ticks, shape (n, m) of FAULT, a column for each axis of each fault; or NO_FAULTS.
 
-    suite : parameters of the sensors       unit : shape (1,), what `Suite` made of them
     release_s : since power-up              source : spikes are drawn from the stream "fault <its text>"
+    unit : shape (1,), the sensors as `Suite` made them
     """
     columns = [column for fault in faults for column in _columns(fault, source, n)]
     if not columns:
@@ -214,13 +216,15 @@ def fault_table(
     table = np.zeros((n, len(columns)), FAULT)
     for j, (fault, axis, values) in enumerate(columns):
         first, end = (_first_tick(t_s + release_s, rates.imu_hz, n) for t_s in (fault.from_s, fault.to_s))
-        least, most = _span(fault.part, getattr(suite, fault.part), unit)
+        least, most = _span(fault.part, unit[0])
         kind = Kind[fault.kind.upper()]
         if kind is Kind.SATURATED:
             values = np.where(values > 0.0, most, least)
         wrong = table[first:end, j]
-        # A spike is a tick in which something is wrong, and so is every tick of the other kinds.
-        wrong["kind"] = np.where(values[first:end] == 0.0, 0, kind) if kind is Kind.SPIKES else kind
+        hit = _sampled(fault.part, rates, unit[0], n)
+        if kind is Kind.SPIKES:
+            hit &= values != 0.0
+        wrong["kind"] = np.where(hit[first:end], kind, 0)
         wrong["part"], wrong["axis"], wrong["before"] = _PARTS[fault.part].code, axis, max(first - 1, 0)
         wrong["value"], wrong["least"], wrong["most"] = values[first:end], least, most
     return table
@@ -252,14 +256,26 @@ def _columns(fault: Fault, source: Source, n: int) -> list[tuple[Fault, int, Arr
     return [(fault, axis, np.full(n, value * si)) for axis in axes]
 
 
-def _span(name: str, part: Any, unit: NDArray[np.void]) -> tuple[float, float]:
+def _sampled(part: str, rates: Rates, unit: np.void, n: int) -> NDArray[np.bool_]:
+    """In which of `n` ticks something may be wrong: of air data those with a sample, which the log does not tell."""
+    steps = int(unit["air"][{"airspeed": "airspeed_steps", "barometer": "baro_steps"}[part]]) if part in _AIR else 1
+    end = np.arange(1, n + 1) * rates.steps_per_tick
+    sampled: NDArray[np.bool_] = end // steps * steps > end - rates.steps_per_tick
+    return sampled
+
+
+def _span(part: str, unit: np.void) -> tuple[float, float]:
     """Lowest and highest reading of a part, in SI; infinite where nothing ends them."""
-    if name in ("gyro", "accelerometer"):
-        si = "rad_s" if name == "gyro" else "m_s2"
-        step, full_scale = float(unit[name][f"step_{si}"][0]), float(unit[name][f"range_{si}"][0])
+    if part in ("gyro", "accelerometer"):
+        si = "rad_s" if part == "gyro" else "m_s2"
+        step, full_scale = float(unit[part][f"step_{si}"]), float(unit[part][f"range_{si}"])
         return convert(-math.inf, step, full_scale), convert(math.inf, step, full_scale)
-    full_scale = _full_scale(name, part)
-    return -full_scale, full_scale - getattr(part, "step_ut", 0.0)
+    if part == "magnetometer":
+        count = float(unit[part]["step_ut"]) or 1.0
+        return count * float(unit[part]["lowest"]), count * float(unit[part]["highest"])
+    if part == "airspeed":
+        return 0.0, math.sqrt(2.0 * float(unit["air"]["range_pa"]) / float(unit["air"]["density_kg_m3"]))
+    return -math.inf, math.inf
 
 
 @kernel
@@ -289,9 +305,9 @@ def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
                     row.mag_b_ut[axis] = measured[k - 1].mag_b_ut[axis] if k > 0 else 0.0
             else:
                 row.mag_b_ut[i] = _wrong(row.mag_b_ut[i], before.mag_b_ut[i], fault)
-        elif fault.part == _AIRSPEED and row.air_new:
+        elif fault.part == _AIRSPEED:
             row.airspeed_m_s = _wrong(row.airspeed_m_s, before.airspeed_m_s, fault)
-        elif fault.part == _BAROMETER and row.air_new:
+        elif fault.part == _BAROMETER:
             row.baro_height_m = _wrong(row.baro_height_m, before.baro_height_m, fault)
         elif fault.part == _GPS and row.gps_new:
             _spoil_fix(measured, k, fault)
@@ -325,11 +341,12 @@ def _spoil_fix(measured, k, fault):  # type: ignore[no-untyped-def]
     """Do to the fix that has arrived in row `k` what is wrong with it; the columns hold it until the next."""
     row, before = measured[k], measured[fault.before]
     if fault.kind == Kind.OUTAGE or (fault.kind == Kind.STUCK and not before.gps_valid):
-        last = measured[k - 1]  # no fix is so early that it arrives in the very first row
-        row.gps_new, row.gps_valid, row.gps_t_s = 0, last.gps_valid, last.gps_t_s
-        _take_fix(last, row)
+        row.gps_new = 0
+        hold(measured[k - 1], row)  # no fix is so early that it arrives in the very first row
     elif fault.kind == Kind.STUCK:
-        _take_fix(before, row)
+        stamp_s = row.gps_t_s
+        hold(before, row)
+        row.gps_t_s = stamp_s
     elif fault.kind == Kind.NAN:
         for i in range(3):
             row.gps_p_e_m[i] = row.gps_v_e_m_s[i] = np.nan
@@ -340,13 +357,3 @@ def _spoil_fix(measured, k, fault):  # type: ignore[no-untyped-def]
         row.gps_v_e_m_s[1] = row.gps_speed_m_s * np.sin(row.gps_course_rad)
     else:  # a jump, or one spike
         row.gps_p_e_m[fault.axis] += fault.value
-
-
-@kernel
-def _take_fix(fix, row):  # type: ignore[no-untyped-def]
-    """Copy all but the stamp of `fix`."""
-    for i in range(3):
-        row.gps_p_e_m[i] = fix.gps_p_e_m[i]
-        row.gps_v_e_m_s[i] = fix.gps_v_e_m_s[i]
-    row.gps_course_rad = fix.gps_course_rad
-    row.gps_speed_m_s = fix.gps_speed_m_s

@@ -1,10 +1,11 @@
 """Rate gyro: turn-on bias, drift, random walk, noise, gain and cross-axis errors, saturation, quantisation.
 
 reading = convert(M omega + bias(t) + noise),   M = 1 + diag(gain) + cross-axis,
-bias(t) = turn-on + drift t + random walk
+bias(t) = turn-on + drift t + slope x warming(t) + flicker noise + random walk
 
 `omega` is the mean inertial rate over the tick.  The additive part bias(t) is what an estimator can learn as
-a bias; it is kept in the truth.  Terms as in IEEE Std 952 (rate ramp, rate random walk, angle random walk).
+a bias; it is kept in the truth.  Terms as in IEEE Std 952 (rate ramp, bias instability, rate random
+walk, angle random walk).
 """
 
 import math
@@ -15,11 +16,13 @@ from numpy.typing import NDArray
 
 from estimator.jit import kernel
 from sim.clock import Rates
-from sim.sensors.board import BoardParams
+from sim.sensors.board import BoardParams, warming
 from sim.sensors.noise import (
+    FLICKER_TIMES_S,
     Output,
     Source,
     convert,
+    flicker,
     random_walk,
     require,
     require_converter,
@@ -37,7 +40,7 @@ class GyroParams:
 
     bias_deg_s : sigma of the bias at turn-on, constant in a flight
     bias_per_k_deg_s : sigma of the change of the bias with temperature, deg/s per kelvin
-    bias_instability_deg_s : floor of the Allan deviation, flicker noise's coefficient B of IEEE Std 952
+    bias_instability_deg_s : flicker noise's coefficient B of IEEE Std 952; alone it has an Allan deviation of 0.664 B
     drift_deg_s_min : sigma of a steady change of the bias, deg/s per minute
     walk_deg_s_sqrt_s : the bias walks at random, sigma after one second, deg/s per root second
     noise_density_deg_s_sqrt_hz : one-sided spectral density of the white noise, as data sheets give it
@@ -103,13 +106,26 @@ def make(params: GyroParams, board: BoardParams, rates: Rates, source: Source, u
 def draw(params: GyroParams, board: BoardParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
     """Draw bias and noise of every tick of a flight into the columns NOISE of `noise`, shape (n,)."""
     n, dt_s = len(noise), rates.dt_s
-    t_s = np.arange(1, n + 1)[:, None] * dt_s
-    turn_on = params.bias_deg_s * source("gyro bias").standard_normal(3)
-    drift = params.drift_deg_s_min / 60.0 * source("gyro drift").standard_normal(3)
-    walk = random_walk(source("gyro walk").standard_normal((n, 3)), params.walk_deg_s_sqrt_s, dt_s)
-    white = source("gyro noise").standard_normal((n, 3))
-    noise["gyro_bias_b_rad_s"] = np.radians(turn_on + drift * t_s + walk)
-    noise["gyro_noise_b_rad_s"] = np.radians(sample_sigma(params.noise_density_deg_s_sqrt_hz, rates.imu_hz)) * white
+    t_s = np.arange(1, n + 1, dtype=np.float64)[:, None] * dt_s
+    bias_deg_s = np.zeros(3)
+    if params.bias_deg_s:
+        bias_deg_s = bias_deg_s + params.bias_deg_s * source("gyro bias").standard_normal(3)
+    if params.drift_deg_s_min:
+        bias_deg_s = bias_deg_s + params.drift_deg_s_min / 60.0 * source("gyro drift").standard_normal(3) * t_s
+    if params.bias_per_k_deg_s and board.warming_k:
+        slope_deg_s_k = params.bias_per_k_deg_s * source("gyro bias per kelvin").standard_normal(3)
+        bias_deg_s = bias_deg_s + slope_deg_s_k * warming(board, t_s)
+    if params.bias_instability_deg_s:
+        steps = source("gyro flicker").standard_normal((n, len(FLICKER_TIMES_S), 3))
+        bias_deg_s = bias_deg_s + flicker(steps, params.bias_instability_deg_s, dt_s)
+    if params.walk_deg_s_sqrt_s:
+        steps = source("gyro walk").standard_normal((n, 3))
+        bias_deg_s = bias_deg_s + random_walk(steps, params.walk_deg_s_sqrt_s, dt_s)
+    noise["gyro_bias_b_rad_s"] = np.radians(bias_deg_s)
+    noise["gyro_noise_b_rad_s"] = 0.0
+    if params.noise_density_deg_s_sqrt_hz:
+        sigma_rad_s = np.radians(sample_sigma(params.noise_density_deg_s_sqrt_hz, rates.imu_hz))
+        noise["gyro_noise_b_rad_s"] = sigma_rad_s * source("gyro noise").standard_normal((n, 3))
 
 
 @kernel

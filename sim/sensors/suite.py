@@ -17,14 +17,15 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log
 from sim.rng import stream
-from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer
+from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
 from sim.sensors.accelerometer import AccelerometerParams, measure_force
 from sim.sensors.air_data import AirspeedParams, BarometerParams, measure_air
 from sim.sensors.board import BoardParams
 from sim.sensors.faults import NO_FAULTS, Fault, fault_table, require_possible, spoil
-from sim.sensors.gps import GpsParams, receive
+from sim.sensors.gps import GpsParams
 from sim.sensors.gyro import GyroParams, measure_rate
 from sim.sensors.magnetometer import MagnetometerParams, measure_field
+from sim.sensors.receiver import receive
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,15 @@ UNIT = np.dtype(
     align=True,
 )
 NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.NOISE, *air_data.NOISE], align=True)
-MEMORY = np.dtype([("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY)], align=True)
+MEMORY = np.dtype(
+    [
+        ("gyro", gyro.MEMORY),
+        ("accelerometer", accelerometer.MEMORY),
+        ("gps", receiver.MEMORY),
+        ("air", air_data.MEMORY),
+    ],
+    align=True,
+)
 
 
 class Snapshot(NamedTuple):
@@ -98,6 +107,10 @@ class Suite:
     ) -> None:  # fmt: skip
         for fault in faults:
             require_possible(fault, params)
+        for what in ("magnetometer", "airspeed", "barometer"):
+            part = getattr(params, what)
+            if part is not None:
+                rates.steps_per_sample(what, part.rate_hz)  # refused here, before the flight
         self.params = params
         self.rates = rates
         self._source = partial(stream, seed, flight)
@@ -122,7 +135,7 @@ class Suite:
         gyro.draw(p.gyro, p.board, rates, source, noise)
         accelerometer.make(p.accelerometer, p.board, rates, source, unit["accelerometer"])
         accelerometer.draw(p.accelerometer, p.board, rates, source, noise)
-        gps.make(p.gps, rates, unit["gps"])
+        gps.make(p.gps, rates, source, unit["gps"])
         gps.draw(p.gps, rates, source, noise)
         if p.magnetometer is not None:
             magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"])
@@ -131,7 +144,7 @@ class Suite:
             air_data.make(p.airspeed, p.barometer, rates, source, unit["air"])
             air_data.draw(p.airspeed, p.barometer, rates, source, noise)
         self._unit, self._noise, self._memory = unit, noise, np.zeros(1, MEMORY)
-        self._faults = fault_table(self.faults, p, self._release_s, rates, source, unit, len(log))
+        self._faults = fault_table(self.faults, self._release_s, rates, source, unit, len(log))
 
     def measure(self, k: int) -> Measurements:
         """Measure tick `k`, whose truth row is complete; a read-only view of its row.
@@ -167,10 +180,10 @@ def _measure(truth, measured, noise, k, unit, memory, faults):  # type: ignore[n
     measured[k].dt_s = u.dt_s
     measure_rate(truth, measured, noise, k, u.gyro, m.gyro)
     measure_force(truth, measured, noise, k, u.accelerometer, u.board, m.accelerometer)
-    receive(truth, measured, noise, k, u.gps)
+    receive(truth, measured, noise, k, u.gps, m.gps)
     if u.magnetometer.fitted:
         measure_field(truth, measured, noise, k, u.magnetometer)
     if u.air.fitted:
-        measure_air(truth, measured, noise, k, u.air)
+        measure_air(truth, measured, noise, k, u.air, m.air)
     if len(faults):
         spoil(truth, measured, k, faults)

@@ -13,12 +13,13 @@ from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.config import FlightConfig, override, resolve
 from scenarios.harness.fault_config import parse_fault
 from sim.clock import Rates
-from sim.log import TRUTH_DTYPE
+from sim.log import TRUTH_DTYPE, Log
+from sim.place import ELEVATION_M
 from sim.rng import stream
-from sim.sensors.air_data import AirspeedParams, BarometerParams
+from sim.sensors.air_data import AirspeedParams, BarometerParams, density_kg_m3
 from sim.sensors.faults import CHANNELS, Fault, fault_table, kinds_of, spoil
 from sim.sensors.magnetometer import MagnetometerParams
-from sim.sensors.suite import SUITES, UNIT, Suite, SuiteParams
+from sim.sensors.suite import SUITES, Suite, SuiteParams
 
 RELEASE_S = 1.0
 N = 200  # ticks of 20 ms, from -1 s to 3 s after the release
@@ -30,21 +31,37 @@ COLUMN = {
 }  # fmt: skip
 SI = {"gyro": math.radians(1.0), "accelerometer": 9.80665, "magnetometer": 1.0, "airspeed": 1.0, "barometer": 1.0}
 FITTED = SuiteParams(
-    magnetometer=MagnetometerParams(), airspeed=AirspeedParams(), barometer=BarometerParams()
+    magnetometer=MagnetometerParams(range_ut=100.0),
+    airspeed=AirspeedParams(range_pa=500.0),
+    barometer=BarometerParams(rate_hz=5.0),
 )  # with the gyro and accelerometer of the generic suite: 300 deg/s, 3 g, 10 bits
+EVERY = {"magnetometer": 5, "airspeed": 5, "barometer": 10}  # ticks between samples: 10, 10 and 5 Hz
 FIX = ("gps_p_e_m", "gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s")
 
 
+def is_sampled(channel, n=N):
+    """In which ticks a sensor reports."""
+    every = EVERY.get(channel.partition(".")[0], 1)
+    return np.arange(n) % every == every - 1
+
+
+def hold(column, sampled):
+    """`column` as a log has it: each sample held until the next."""
+    for k in np.flatnonzero(~sampled):
+        column[k] = column[k - 1] if k > 0 else 0.0
+    return column
+
+
 def readings(n=N):
-    """What sensors might report: every number another, a fix every 10th tick, the rest every 5th, all at once."""
+    """What sensors might report: every number another, the airspeed about 10 m/s, a fix every 10th tick."""
     rows = np.zeros(n, MEASURED_DTYPE)
     k = np.arange(n)
     for i, (part, column) in enumerate(COLUMN.items()):
         shape = rows[column].shape
-        rows[column] = SI[part] * np.sin(
-            1.0 + k.reshape(-1, *[1] * (len(shape) - 1)) + np.arange(math.prod(shape[1:])) + i
-        )
-    rows["mag_new"] = rows["air_new"] = k % 5 == 4
+        phase = k.reshape(-1, *[1] * (len(shape) - 1)) + np.arange(math.prod(shape[1:])) + i
+        rows[column] = SI[part] * np.sin(1.0 + phase) + 10.0 * (part == "airspeed")
+        hold(rows[column], is_sampled(part, n))
+    rows["mag_new"] = rows["air_new"] = is_sampled("airspeed", n)
     fix = k // 10 * 10
     rows["gps_new"], rows["gps_valid"], rows["gps_t_s"] = k % 10 == 0, 1, 0.02 * fix
     rows["gps_p_e_m"] = fix[:, None] * [1.0, 2.0, 3.0]
@@ -54,28 +71,27 @@ def readings(n=N):
     return rows
 
 
-def table_of(*faults, n=N, seed=3, release_s=RELEASE_S, rates=None):
+def table_of(*faults, n=N, seed=3, release_s=RELEASE_S):
     """The table of faults over `n` ticks, given as text."""
-    rates = rates or Rates()
-    suite = Suite(FITTED, rates, seed)
-    unit = np.zeros(1, UNIT)
-    unit["gyro"]["step_rad_s"], unit["gyro"]["range_rad_s"] = math.radians(600.0) / 1024, math.radians(300.0)
-    unit["accelerometer"]["step_m_s2"], unit["accelerometer"]["range_m_s2"] = 6 * 9.80665 / 1024, 3 * 9.80665
-    parsed = [parse_fault(fault) for fault in faults]
-    return fault_table(parsed, suite.params, release_s, rates, partial(stream, seed, 0), unit, n)
+    suite = Suite(FITTED, Rates(), seed)
+    suite.reset(Log.empty(1))
+    unit = suite.snapshot().unit
+    return fault_table([parse_fault(f) for f in faults], release_s, Rates(), partial(stream, seed, 0), unit, n)
 
 
 def spoiled(*faults, rows=None, seed=3):
-    """Truth and measurements after the faults; GPS and magnetometer columns are held from the row before."""
+    """Truth and measurements after the faults, what is not new held from the row before as sensors hold it."""
     clean = readings() if rows is None else rows
     truth, measured = np.zeros(len(clean), TRUTH_DTYPE), np.zeros(len(clean), MEASURED_DTYPE)
     truth["gyro_bias_b_rad_s"], truth["force_bias_b_m_s2"] = 0.01, 0.1
     table = table_of(*faults, seed=seed)
     for k in range(len(clean)):
         measured[k] = clean[k]
-        if k > 0 and not clean["gps_new"][k]:
-            for column in ("gps_valid", "gps_t_s", *FIX):
-                measured[column][k] = measured[column][k - 1]
+        held = [COLUMN[part] for part in EVERY if not is_sampled(part)[k]]
+        if not clean["gps_new"][k]:
+            held += ["gps_valid", "gps_t_s", *FIX]
+        for column in held if k > 0 else []:
+            measured[column][k] = measured[column][k - 1]
         spoil(truth, measured, k, table)
     return truth, measured
 
@@ -85,6 +101,17 @@ def of(channel, rows):
     part, _, axis = channel.partition(".")
     column = rows[COLUMN[part]].reshape(len(rows), -1)
     return column[:, ["xyz".index(axis)] if axis else slice(None)]
+
+
+def expected_of(channel, change):
+    """Readings of a channel where the samples in the window are what `change` makes of them; held until the next."""
+    column, sampled = of(channel, readings()).copy(), is_sampled(channel)
+    for k in range(IN.start, N):
+        if not sampled[k]:
+            column[k] = column[k - 1]
+        elif k < IN.stop:
+            column[k] = change(column[k])
+    return column
 
 
 READINGS = [c for c in CHANNELS if c != "gps"]
@@ -229,11 +256,9 @@ def test_window_holds_the_readings_from_its_begin_to_before_its_end(window, rele
 @pytest.mark.parametrize("channel", READINGS)
 def test_stuck_repeats_the_reading_before_the_window(channel):
     """Bit for bit; reports that come now and then repeat what was reported last."""
-    clean, (_, measured) = readings(), spoiled(f"{channel}:stuck{WINDOW}")
-    expected = of(channel, clean).copy()
-    new = np.ones(N, bool) if channel[:3] in ("gyr", "acc") else clean["mag_new"] > 0
-    hit = np.flatnonzero(new[IN]) + IN.start
-    expected[hit] = expected[IN.start - 1]
+    _, measured = spoiled(f"{channel}:stuck{WINDOW}")
+    before = of(channel, readings())[IN.start - 1]
+    expected = expected_of(channel, lambda _: before)
     np.testing.assert_array_equal(of(channel, measured), expected)
 
 
@@ -241,11 +266,8 @@ def test_stuck_repeats_the_reading_before_the_window(channel):
 @pytest.mark.parametrize(("kind", "value"), [("dropout", 0.0), ("nan", np.nan)])
 def test_dropout_reads_zero_and_nan_is_no_number(channel, kind, value):
     """What answers nothing on a bus reads zeros."""
-    clean, (_, measured) = readings(), spoiled(f"{channel}:{kind}{WINDOW}")
-    expected = of(channel, clean).copy()
-    new = np.ones(N, bool) if channel[:3] in ("gyr", "acc") else clean["air_new"] > 0
-    expected[np.flatnonzero(new[IN]) + IN.start] = value
-    np.testing.assert_array_equal(of(channel, measured), expected)
+    _, measured = spoiled(f"{channel}:{kind}{WINDOW}")
+    np.testing.assert_array_equal(of(channel, measured), expected_of(channel, lambda _: value))
 
 
 def test_magnetometer_dropout_brings_no_new_sample():
@@ -260,15 +282,12 @@ def test_magnetometer_dropout_brings_no_new_sample():
 
 @pytest.mark.parametrize("channel", READINGS)
 @pytest.mark.parametrize(
-    ("text", "of_reading"), [("bias=0.5", lambda x, si: x + 0.5 * si), ("gain=-2", lambda x, _: -2.0 * x)]
+    ("text", "of_reading"), [("bias=0.5", lambda x, si: x + 0.5 * si), ("gain=1.5", lambda x, _: 1.5 * x)]
 )
 def test_bias_adds_its_amount_and_gain_multiplies(channel, text, of_reading):
-    """In deg/s, g, uT, m/s and m, within full scale, in new reports alone; round-off of a sum or product."""
-    clean, (_, measured) = readings(), spoiled(f"{channel}:{text}{WINDOW}")
-    expected = of(channel, clean).copy()
-    new = np.ones(N, bool) if channel[:3] in ("gyr", "acc") else clean["mag_new"] > 0
-    hit = np.flatnonzero(new[IN]) + IN.start
-    expected[hit] = of_reading(expected[hit], SI[channel.partition(".")[0]])
+    """In deg/s, g, uT, m/s and m, once in each new sample; round-off of a sum or product."""
+    _, measured = spoiled(f"{channel}:{text}{WINDOW}")
+    expected = expected_of(channel, lambda x: of_reading(x, SI[channel.partition(".")[0]]))
     np.testing.assert_allclose(of(channel, measured), expected, rtol=0, atol=1e-14)
 
 
@@ -279,6 +298,15 @@ def test_saturated_reads_the_last_level_of_the_converter(sign, counts):
     rate, force = counts * math.radians(300.0) / 512, counts * 3.0 * 9.80665 / 512
     np.testing.assert_allclose(measured["gyro_b_rad_s"][IN], rate, rtol=0, atol=1e-14)
     np.testing.assert_allclose(measured["force_b_m_s2"][IN, 1], force, rtol=0, atol=1e-14)
+
+
+def test_saturated_magnetometer_and_pitot_tube_read_their_full_scale():
+    """100 uT; 500 Pa are sqrt(2 p / rho) of airspeed, and no pressure is less than none."""
+    _, measured = spoiled(f"mag:saturated{WINDOW}", f"airspeed:saturated{WINDOW}", "airspeed:saturated=-1@2")
+    np.testing.assert_allclose(measured["mag_b_ut"][104:149], 100.0, rtol=0, atol=1e-12)
+    fastest = math.sqrt(2.0 * 500.0 / density_kg_m3(ELEVATION_M))
+    np.testing.assert_allclose(measured["airspeed_m_s"][104:149], fastest, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(measured["airspeed_m_s"][149:], 0.0)
 
 
 @pytest.mark.parametrize("text", ["bias=9999", "gain=1e9", "spikes=9999,1"])
@@ -340,10 +368,9 @@ def test_gps_spikes_displace_fixes_by_their_amplitude_in_any_direction():
     assert len(np.unique(np.sign(off[hit, :2]), axis=0)) == 4  # all quadrants
 
 
-def held(clean, changed):
-    """`clean` with its new fixes replaced by `changed`, and held until the next."""
-    latest = np.arange(N) // 10 * 10
-    return changed[latest]
+def held(fixes):
+    """Rows that hold each of the `fixes`, every 10th, until the next."""
+    return fixes[np.arange(N) // 10 * 10]
 
 
 @pytest.mark.parametrize("text", ["jump=30,-40", "nan", "stuck", "frozen_course"])
@@ -364,7 +391,7 @@ def test_gps_fault_lasts_for_the_fixes_in_its_window(text):
         changed["gps_v_e_m_s"][hit, 0], changed["gps_v_e_m_s"][hit, 1] = speed * np.cos(course), speed * np.sin(course)
     else:
         changed["gps_p_e_m"][hit] += [30.0, -40.0, 0.0]
-    expected = held(clean, changed)
+    expected = held(changed)
     for column in FIX:
         np.testing.assert_allclose(measured[column], expected[column], rtol=0, atol=1e-12)
     for column in ("gps_new", "gps_valid", "gps_t_s"):
@@ -424,7 +451,7 @@ def test_reading_sticks_at_what_was_reported_wrong():
 def test_jump_in_an_outage_is_seen_in_the_fixes_that_arrive():
     """The outage hides its own fixes, the jump goes on in those after it."""
     clean, (_, measured) = readings(), spoiled("gps:jump=30@1-3", f"gps:outage{WINDOW}")
-    off = measured["gps_p_e_m"][:, 0] - held(clean, clean)["gps_p_e_m"][:, 0]
+    off = measured["gps_p_e_m"][:, 0] - held(clean)["gps_p_e_m"][:, 0]
     np.testing.assert_array_equal(off[[90, 150, 160, 190]], [0.0, 30.0, 30.0, 30.0])
     assert not measured["gps_new"][IN].any()
 
