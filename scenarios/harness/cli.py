@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | bench | aircraft | view``.
+"""The command line: ``wingslevel list | fly | check | bench | aircraft | export | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Annotated, Any
@@ -276,6 +277,32 @@ def aircraft(
 
 
 @app.command()
+def export(
+    flight: Annotated[
+        Path | None, typer.Argument(help="Folder of a recording, or its .parquet file; by default the newest.")
+    ] = None,
+    nmea: Annotated[Path | None, typer.Option(metavar="FILE", help="Write NMEA 0183: GGA, RMC and VTG.")] = None,
+    ubx: Annotated[Path | None, typer.Option(metavar="FILE", help="Write UBX NAV-PVT.")] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2025-06-01T12:00:00]")
+    ] = None,
+    json_: JsonOption = None,
+) -> None:
+    """The GPS fixes of a recording, as the sentences and messages that a receiver sends."""
+    with _reporting(json_) as report:
+        with usage():
+            from scenarios.harness import exporting, viewing
+
+            for path in (nmea, ubx):
+                _check_file(path)
+            done = exporting.make(flight or viewing.newest(FLIGHTS), nmea, ubx, exporting.parse_start(start))
+        for path, data in done.files.values():
+            _write(path, partial(bytes, data))
+        report(done.to_json())
+        exporting.tell(done)  # last: a reader who closes the pipe loses no file
+
+
+@app.command()
 def view(
     flight: Annotated[
         Path | None, typer.Argument(help="Folder of a recording, or a .rrd or .parquet file; by default the newest.")
@@ -363,15 +390,17 @@ def _is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def _write(path: Path | None, text: Callable[[], str]) -> None:
+def _write(path: Path | None, content: Callable[[], str | bytes]) -> None:
     """Write a report, complete or not at all."""
     if path is None:
         return
     from sim.recording import replacing
 
+    made = content()
+    data = made.encode("utf-8") if isinstance(made, str) else made
     target = path.resolve()  # what a link points to is replaced, not the link
     if _is_stream(target):
-        target.write_text(text(), encoding="utf-8")
+        target.write_bytes(data)
         return
     with usage(), replacing(target) as temporary:
-        temporary.write_text(text(), encoding="utf-8")
+        temporary.write_bytes(data)

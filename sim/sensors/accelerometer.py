@@ -1,6 +1,6 @@
 """Accelerometer: bias, noise, saturation and quantisation on the specific force at the centre of gravity.
 
-reading = convert(f + bias(t) + noise)
+reading = convert(supply(curve(M f) + bias(t) + noise)),   M = (1 + diag(gain) + cross-axis) R_sb
 bias(t) = turn-on + slope x warming(t) + flicker noise + random walk
 
 `f` is acceleration minus gravity, mean over the tick: level at rest (0, 0, -g).
@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 
 from estimator.jit import kernel
 from sim.clock import Rates
+from sim.sensors import device
 from sim.sensors.board import BoardParams, warming
+from sim.sensors.device import distort, on_supply, quantise, rate_shape, shake, step_filter
 from sim.sensors.noise import (
     FLICKER_TIMES_S,
     STANDARD_GRAVITY_M_S2,
     Output,
     Source,
-    convert,
     flicker,
     random_walk,
     require,
     require_converter,
     require_device,
     sample_sigma,
-    step_of,
 )
 
 
@@ -82,15 +82,20 @@ class AccelerometerParams:
         require_converter(self, "g", "range_g")
 
 
-UNIT = np.dtype([("step_m_s2", "f8"), ("range_m_s2", "f8")], align=True)
-MEMORY = np.dtype([("filtered", "f8", (3,))], align=True)  # state of the low-pass filter
+UNIT = np.dtype([*device.DEVICE, ("off_centre", "i8")], align=True)
+MEMORY = np.dtype([*device.MEMORY, ("felt", "f8", (3,))], align=True)  # mean force at the part, before its filter
 NOISE = (("force_bias_b_m_s2", "f8", (3,)), ("force_noise_b_m_s2", "f8", (3,)))
 
 
 def make(params: AccelerometerParams, board: BoardParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
-    """Make one accelerometer: set its converter in `unit`, shape (1,) of UNIT."""
-    unit["range_m_s2"] = params.range_g * STANDARD_GRAVITY_M_S2
-    unit["step_m_s2"] = step_of(params.range_g * STANDARD_GRAVITY_M_S2, params.bits)
+    """Make one accelerometer: draw the errors that stay for life into `unit`, shape (1,) of UNIT."""
+    g = STANDARD_GRAVITY_M_S2
+    device.make(
+        params, board, rates, source, unit, name="accelerometer",
+        full_scale=params.range_g * g, step=params.step_g * g, null=params.null_g * g,
+        shake=board.vibration_g * g, density_sqrt_hz=1e-6 * params.noise_density_ug_sqrt_hz * g,
+    )  # fmt: skip
+    unit["off_centre"] = any(board.lever_arm_b_m)
 
 
 def draw(
@@ -119,11 +124,73 @@ def draw(
 
 
 @kernel
-def measure_force(truth, measured, noise, k, unit, board, memory):  # type: ignore[no-untyped-def]
-    """Fill the accelerometer reading of row `k`, and the bias in the truth; `unit` is a record of UNIT."""
+def measure_force(truth, measured, noise, k, unit, board, memory, state):  # type: ignore[no-untyped-def]
+    """Fill the accelerometer reading of row `k`, and the bias in the truth.
+
+    `unit`, `memory` : records of UNIT and MEMORY       `board`, `state` : records of the board's UNIT and MEMORY
+    """
     row, errors = truth[k], noise[k]
+    force = row.imu_force_b_m_s2
+    if unit.filters or unit.shakes or unit.off_centre:
+        feel_force(truth, k, unit, board, memory, state)
+        force = memory.signal
     for i in range(3):
         bias = errors.force_bias_b_m_s2[i]
-        sensed = row.imu_force_b_m_s2[i] + bias + errors.force_noise_b_m_s2[i]
-        measured[k].force_b_m_s2[i] = convert(sensed, unit.step_m_s2, unit.range_m_s2)
+        turned = unit.M[i, 0] * force[0] + unit.M[i, 1] * force[1] + unit.M[i, 2] * force[2]
+        if unit.distorts:
+            sensed = distort(turned, i, unit, state) + bias + errors.force_noise_b_m_s2[i]
+            sensed, bias = on_supply(sensed, unit, state), on_supply(bias, unit, state)
+        else:
+            sensed = turned + bias + errors.force_noise_b_m_s2[i]
+        measured[k].force_b_m_s2[i] = quantise(sensed, unit)
         row.force_bias_b_m_s2[i] = bias
+
+
+@kernel
+def feel_force(truth, k, unit, board, memory, state):  # type: ignore[no-untyped-def]
+    """Mean over tick k of the force behind the low-pass filter, lever arm and vibration included, into `memory.signal`.
+
+    Of the force the truth holds means alone, h apart.  In a tick it is taken as the straight line with that mean
+    and the rise since the mean of the tick before.  With x from mid-tick a force f(t) errs from that line by
+    (x^2 + h x - h^2 / 12) / 2 times its second derivative.  That has no mean, and while it stays the same it leaves
+    no error in the means behind the filter: theirs is at most h^3 / 23 times the largest third derivative, to the
+    next power of h, whatever the bandwidth.
+    """
+    signal = memory.signal
+    for i in range(3):
+        signal[i] = truth[k].imu_force_b_m_s2[i]
+    if unit.off_centre:
+        carry(truth, k, board, signal)
+    if unit.filters:
+        for i in range(3):
+            mean = signal[i]
+            rise = mean - memory.felt[i] if k > 0 else 0.0
+            before = memory.filtered[i] if k > 0 else mean
+            memory.felt[i] = mean
+            after = step_filter(unit.low_pass, before, mean, rise, 0.0)
+            memory.filtered[i] = after
+            signal[i] = mean - (after - before) * unit.low_pass[4]
+    if unit.shakes:
+        shake(unit, board, state, signal)
+
+
+@kernel
+def carry(truth, k, board, force):  # type: ignore[no-untyped-def]
+    """Add to `force`, shape (3,), what the lever arm r adds: the mean of omega x (omega x r) + d(omega)/dt x r.
+
+    omega x (omega x r) = omega (omega . r) - r omega^2.  The rate is the parabola m + d/2 P1 + q P2 of
+    `rate_shape`, so that the mean of omega_i omega_j is m_i m_j + d_i d_j / 12 + q_i q_j / 5 exactly.
+    """
+    r, m = board.lever_arm_b_m, truth[k].imu_omega_b_rad_s
+    dx, qx = rate_shape(truth, k, 0)
+    dy, qy = rate_shape(truth, k, 1)
+    dz, qz = rate_shape(truth, k, 2)
+    xx = m[0] * m[0] + dx * dx / 12.0 + qx * qx / 5.0
+    yy = m[1] * m[1] + dy * dy / 12.0 + qy * qy / 5.0
+    zz = m[2] * m[2] + dz * dz / 12.0 + qz * qz / 5.0
+    xy = m[0] * m[1] + dx * dy / 12.0 + qx * qy / 5.0
+    xz = m[0] * m[2] + dx * dz / 12.0 + qx * qz / 5.0
+    yz = m[1] * m[2] + dy * dz / 12.0 + qy * qz / 5.0
+    force[0] += xy * r[1] + xz * r[2] - (yy + zz) * r[0] + (dy * r[2] - dz * r[1]) / board.dt_s
+    force[1] += xy * r[0] + yz * r[2] - (xx + zz) * r[1] + (dz * r[0] - dx * r[2]) / board.dt_s
+    force[2] += xz * r[0] + yz * r[1] - (xx + yy) * r[2] + (dx * r[1] - dy * r[0]) / board.dt_s

@@ -32,7 +32,8 @@ from numpy.typing import NDArray
 from estimator.interface import Array
 from estimator.jit import kernel
 from sim.clock import Rates
-from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Source, convert
+from sim.sensors.device import quantise
+from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Source
 from sim.sensors.receiver import hold
 
 LATEST_S: Final = 36000.0
@@ -267,9 +268,7 @@ def _sampled(part: str, rates: Rates, unit: np.void, n: int) -> NDArray[np.bool_
 def _span(part: str, unit: np.void) -> tuple[float, float]:
     """Lowest and highest reading of a part, in SI; infinite where nothing ends them."""
     if part in ("gyro", "accelerometer"):
-        si = "rad_s" if part == "gyro" else "m_s2"
-        step, full_scale = float(unit[part][f"step_{si}"]), float(unit[part][f"range_{si}"])
-        return convert(-math.inf, step, full_scale), convert(math.inf, step, full_scale)
+        return quantise(-math.inf, unit[part]), quantise(math.inf, unit[part])
     if part == "magnetometer":
         count = float(unit[part]["step_ut"]) or 1.0
         return count * float(unit[part]["lowest"]), count * float(unit[part]["highest"])

@@ -159,20 +159,3 @@ def _recur_and_sum(steps, phi, sigma, total):  # type: ignore[no-untyped-def]
                 if k > 0:
                     x[j, i] = phi[j] * x[j, i] + fresh[j] * steps[k, j, i]
                 total[k, i] += sigma[j] * x[j, i]
-
-
-def step_of(full_scale: float, bits: int) -> float:
-    """Size of one converter step over +-`full_scale` with `bits` bits; 0 where nothing is quantised."""
-    return 2.0 * full_scale / 2**bits if bits else 0.0
-
-
-@kernel
-def convert(x, step, full_scale):  # type: ignore[no-untyped-def]
-    """What the converter makes of `x`: the nearest of its levels, clipped to its range.
-
-    Two's complement: the lowest level is -full_scale, the highest one step below +full_scale.
-    """
-    if step == 0.0:
-        return min(max(x, -full_scale), full_scale)
-    highest = full_scale / step - 1.0
-    return step * min(max(np.floor(x / step + 0.5), -highest - 1.0), highest)

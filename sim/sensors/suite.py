@@ -20,7 +20,7 @@ from sim.rng import stream
 from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
 from sim.sensors.accelerometer import AccelerometerParams, measure_force
 from sim.sensors.air_data import AirspeedParams, BarometerParams, measure_air
-from sim.sensors.board import BoardParams
+from sim.sensors.board import BoardParams, attend
 from sim.sensors.faults import NO_FAULTS, Fault, fault_table, require_possible, spoil
 from sim.sensors.gps import GpsParams
 from sim.sensors.gyro import GyroParams, measure_rate
@@ -76,6 +76,7 @@ UNIT = np.dtype(
 NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.NOISE, *air_data.NOISE], align=True)
 MEMORY = np.dtype(
     [
+        ("board", board.MEMORY),
         ("gyro", gyro.MEMORY),
         ("accelerometer", accelerometer.MEMORY),
         ("gps", receiver.MEMORY),
@@ -130,7 +131,7 @@ class Suite:
         p, rates, source = self.params, self.rates, self._source
         unit, noise = np.zeros(1, UNIT), np.zeros(len(log), NOISE)
         unit["dt_s"] = rates.dt_s
-        board.make(p.board, unit["board"])
+        board.make(p.board, rates, source, unit["board"])
         gyro.make(p.gyro, p.board, rates, source, unit["gyro"])
         gyro.draw(p.gyro, p.board, rates, source, noise)
         accelerometer.make(p.accelerometer, p.board, rates, source, unit["accelerometer"])
@@ -178,8 +179,10 @@ def _measure(truth, measured, noise, k, unit, memory, faults):  # type: ignore[n
     u, m = unit[0], memory[0]
     measured[k].t_s = truth[k].t_s
     measured[k].dt_s = u.dt_s
-    measure_rate(truth, measured, noise, k, u.gyro, m.gyro)
-    measure_force(truth, measured, noise, k, u.accelerometer, u.board, m.accelerometer)
+    if u.board.changes:
+        attend(truth, k, u.board, m.board)
+    measure_rate(truth, measured, noise, k, u.gyro, u.board, m.gyro, m.board)
+    measure_force(truth, measured, noise, k, u.accelerometer, u.board, m.accelerometer, m.board)
     receive(truth, measured, noise, k, u.gps, m.gps)
     if u.magnetometer.fitted:
         measure_field(truth, measured, noise, k, u.magnetometer)

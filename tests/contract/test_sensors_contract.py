@@ -9,8 +9,22 @@ from autopilot.interface import NEUTRAL
 from sim.clock import Rates
 from sim.log import Log
 from sim.prescribed_plant import PrescribedPlant, SteadyTurn
-from sim.sensors.suite import SUITES, Suite
+from sim.sensors.accelerometer import AccelerometerParams
+from sim.sensors.board import BoardParams
+from sim.sensors.gyro import GyroParams
+from sim.sensors.suite import SUITES as SHIPPED
+from sim.sensors.suite import Suite, SuiteParams
 
+DEVICE = {
+    "gain": 0.02, "gain_per_k": 1e-3, "nonlinearity": 0.002, "cross_axis": 0.01, "bandwidth_hz": 42.0,
+    "conversions": 4, "output": "absolute",
+}  # fmt: skip
+EVERYTHING = SuiteParams(
+    GyroParams(**DEVICE, g_sensitivity_deg_s_g=0.1, null_deg_s=300.0),
+    AccelerometerParams(**DEVICE, null_g=3.0),
+    board=BoardParams((0.1, 0.02, -0.05), (2.0, -1.0, 3.0), 0.02, 0.05, True, 10.0, 60.0, 0.3, 4.0),
+)  # every term of gyro, accelerometer and board that no shipped suite needs
+SUITES = {**SHIPPED, "everything": EVERYTHING}
 every_suite = pytest.mark.parametrize("name", SUITES)
 N = 150
 SENSED_TRUTH = ("gyro_bias_b_rad_s", "force_bias_b_m_s2", "gps_p_e_m", "gps_v_e_m_s")
@@ -23,6 +37,7 @@ def truth_log(n_ticks=2 * N, rates=None):
     plant.reset(log)
     for k in range(n_ticks):
         plant.advance(k, NEUTRAL)
+    log.truth["rotor_rpm"], log.truth["throttle"] = np.linspace(6000.0, 8000.0, n_ticks), np.linspace(0.3, 0.9, n_ticks)
     return log
 
 
