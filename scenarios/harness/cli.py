@@ -72,6 +72,18 @@ ImuRateOption = Annotated[
 SensorsOption = Annotated[
     str | None, typer.Option("--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.")
 ]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        metavar="FAULT",
+        help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
+        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
+        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
+        "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
+        "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
+    ),
+]
 JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
@@ -148,6 +160,7 @@ def fly(
     gps_rate: GpsRateOption = None,
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
+    fault: FaultOption = None,
     duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the flight after the release.")] = None,
     seed: Annotated[
         int | None, typer.Option(help="Another seed, another flight; the same seed, the same bits. [default: 0]")
@@ -162,7 +175,7 @@ def fly(
     """Fly a scenario once, record it, judge it."""
     from scenarios.harness import single, viewing
 
-    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors) | _given(
+    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault) | _given(
         {"estimator": estimator, "duration_s": duration, "seed": seed}
     )
     with _reporting(json_) as report:
@@ -191,6 +204,7 @@ def check(
     gps_rate: GpsRateOption = None,
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
+    fault: FaultOption = None,
     set_: SetOption = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
@@ -204,7 +218,7 @@ def check(
         with usage():
             for path in (junit, markdown):
                 _check_file(path)
-            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors)
+            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
@@ -355,11 +369,12 @@ def _changes(assignments: list[str] | None) -> dict[str, Any]:
 
 
 def _fitted(
-    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None
-) -> dict[str, Any]:
-    """What flies and what it carries, by the names of the configuration."""
+    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None,
+    faults: list[str] | None,
+) -> dict[str, Any]:  # fmt: skip
+    """What flies, what it carries and what of that fails, by the names of the configuration."""
     named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
-    return _given(named | {"suite": suite})
+    return _given(named | {"suite": suite, "faults": faults or None})
 
 
 def _given(named: dict[str, Any]) -> dict[str, Any]:

@@ -9,10 +9,11 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from scenarios.harness.air_config import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.air_config import parse_wind, resolve_air
+from scenarios.harness.fault_config import require_faults_possible, typed_faults
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.validation import validated
 from sim.clock import Rates
@@ -112,6 +113,7 @@ class FlightConfig(_Model):
     changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
     files : path -> text of the files of one's own that the suite is made of; a resolved configuration holds them
     manoeuvre : the scenario's own parameters
+    faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
     box_radius_m, box_height_m : of the cylinder around the launch point; beyond it the flight is over
     seed, flight : campaign and number of the flight in it, which name the random streams
     """
@@ -125,6 +127,7 @@ class FlightConfig(_Model):
     suite: str = "generic"
     sensors: dict[str, Figure] = Field(default_factory=dict)
     files: dict[str, str] = Field(default_factory=dict)
+    faults: tuple[str, ...] = ()
     air: AirConfig = Field(default_factory=AirConfig)
     start: Annotated[InFlightStart | HandThrowStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
@@ -133,6 +136,11 @@ class FlightConfig(_Model):
     seed: int = Field(default=0, ge=0)
     flight: int = Field(default=0, ge=0)
 
+    @field_validator("faults", mode="before")
+    @classmethod
+    def _typed_faults(cls, faults: Any) -> Any:
+        return typed_faults(faults)
+
     @property
     def heading_deg(self) -> float:
         """Heading at the start; ValueError where it has not been drawn yet."""
@@ -140,6 +148,11 @@ class FlightConfig(_Model):
         if isinstance(heading_deg, str):
             raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
         return heading_deg
+
+    @property
+    def held_s(self) -> float:
+        """From power-up to the release."""
+        return self.start.hold_s + self.start.push_s if isinstance(self.start, HandThrowStart) else 0.0
 
 
 def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig:
@@ -163,7 +176,8 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
         else:
             _put(data, _full_name(name, config), value)
     changed = validated(FlightConfig, data)
-    suite_params(changed.suite, changed.sensors, changed.files)  # refuses a suite or a value that cannot be
+    # Refuses a suite, a value or a fault that cannot be.
+    require_faults_possible(changed.faults, suite_params(changed.suite, changed.sensors, changed.files))
     return changed
 
 

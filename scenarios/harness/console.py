@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from scenarios.harness.checks import Row
+    from scenarios.harness.config import FlightConfig
 
 USAGE, INTERRUPTED = 2, 130  # exit codes, beside those of a verdict
 WIDTH = 80
@@ -50,6 +51,17 @@ def warn_if_cold() -> None:
 
     if is_cold():
         err().print("compiling the kernels, this once: about half a minute", style="dim")
+
+
+def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
+    """Say which faults the flight is too short for, each on a line of standard error."""
+    from scenarios.harness.fault_config import never_met
+
+    for fault in never_met(config.faults, config.held_s, config.duration_s):
+        error(
+            f"warning: fault {fault} is never met: {scenario} lasts from {-config.held_s:g} s to {config.duration_s:g} "
+            "s after the release"
+        )
 
 
 def number(value: float) -> str:

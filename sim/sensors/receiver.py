@@ -51,14 +51,14 @@ def receive(truth, measured, noise, k, unit, memory):  # type: ignore[no-untyped
     if k == 0:
         measured[k].gps_valid = 0
     else:
-        _hold(measured[k - 1], measured[k])
+        hold(measured[k - 1], measured[k])
     # The newest fix that can have arrived by the end of this tick, and the step at which it was true.
     spt, spf = unit.steps_per_tick, unit.steps_per_fix
     step = ((k + 1) * spt - unit.latency_steps) // spf * spf
     if step + unit.latency_steps > k * spt and step >= max(unit.first_fix_step, spf):
         at = (step + spt - 1) // spt - 1  # the row of the tick that `step` lies in
         if not noise[at].satellites_lost and not _report(truth, measured[k], noise, step, at, unit, memory):
-            _hold(measured[k - 1], measured[k])
+            hold(measured[k - 1], measured[k])
 
 
 @kernel
@@ -77,7 +77,8 @@ def _filter(truth, k, unit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _hold(last, row):  # type: ignore[no-untyped-def]
+def hold(last, row):  # type: ignore[no-untyped-def]
+    """Keep in `row` the fix of the row `last`."""
     row.gps_valid = last.gps_valid
     row.gps_t_s = last.gps_t_s
     for i in range(3):

@@ -3,6 +3,7 @@
 Row k of the measured log is filled from the truth of rows up to k alone.
 """
 
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer,
 from sim.sensors.accelerometer import measure_force
 from sim.sensors.air_data import measure_air
 from sim.sensors.board import attend
-from sim.sensors.faults import FAULT, spoil
+from sim.sensors.faults import NO_FAULTS, Fault, fault_table, require_possible, spoil
 from sim.sensors.fitting import SUITES as SUITES
 from sim.sensors.fitting import SuiteParams as SuiteParams
 from sim.sensors.gyro import measure_rate
@@ -60,14 +61,18 @@ class Snapshot(NamedTuple):
 
 
 class Suite:
-    """The sensors of flight number `flight` of the campaign `seed`, with `faults`, shape (n,) of FAULT.
+    """The sensors of flight number `flight` of the campaign `seed`, with `faults`.
 
-    Its errors are drawn in `reset`.  Filters remember in one record what rows of the log cannot tell.
+    The times of faults count from the release, `release_s` after power-up.  Errors are drawn in `reset`.  Filters
+    remember in one record what rows of the log cannot tell.
     """
 
     def __init__(
-        self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: NDArray[np.void] | None = None
-    ) -> None:
+        self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: Sequence[Fault] = (),
+        release_s: float = 0.0,
+    ) -> None:  # fmt: skip
+        for fault in faults:
+            require_possible(fault, params)
         for what in ("magnetometer", "airspeed", "barometer"):
             part = getattr(params, what)
             if part is not None:
@@ -80,7 +85,8 @@ class Suite:
         self._noise = np.zeros(0, NOISE)
         self._unit = np.zeros(1, UNIT)
         self._memory = np.zeros(1, MEMORY)
-        self._faults = np.zeros(0, FAULT) if faults is None else faults
+        self.faults, self._release_s = tuple(faults), release_s
+        self._faults = NO_FAULTS
 
     def reset(self, log: Log) -> None:
         """Power up: draw the errors of a flight as long as `log`, whose rows `measure` fills from 0 on."""
@@ -104,6 +110,7 @@ class Suite:
             air_data.make(p.airspeed, p.barometer, rates, source, unit["air"])
             air_data.draw(p.airspeed, p.barometer, rates, source, noise)
         self._unit, self._noise, self._memory = unit, noise, np.zeros(1, MEMORY)
+        self._faults = fault_table(self.faults, self._release_s, rates, source, unit, len(log))
 
     def measure(self, k: int) -> Measurements:
         """Measure tick `k`, whose truth row is complete; a read-only view of its row.
