@@ -102,6 +102,7 @@ class MatrixPilotParams:
                                accelerations get in
     k_p_yaw, k_i_yaw : float   the same for yaw
     centrifugal_from_gps : bool   omega x V with the speed of the GPS (Eqns 25-26, the firmware up to 2017)
+    keep_tilt : bool           renormalise without touching the Z row's direction (the firmware up to 2017: Eqns 18-21)
     forward_acceleration : bool   take the change of speed between reports out of the accelerometer
     estimate_wind : bool       learn the wind, and let yaw meet the velocity through the air
     late_by_one_report : bool  carry a report on by its last change
@@ -118,6 +119,7 @@ class MatrixPilotParams:
     k_p_yaw: float = 0.232
     k_i_yaw: float = 0.0023
     centrifugal_from_gps: bool = False
+    keep_tilt: bool = True
     forward_acceleration: bool = True
     estimate_wind: bool = True
     late_by_one_report: bool = True
@@ -146,6 +148,8 @@ UDB4 = MatrixPilotParams()
 """Analog gyros, 40 Hz."""
 UDB5 = MatrixPilotParams(k_p_rp=0.119, k_i_rp=0.0074, k_p_yaw=0.141, k_i_yaw=0.0013)
 """UDB5 and AUAV3: digital gyros, 200 Hz."""
+CLASSIC = MatrixPilotParams(centrifugal_from_gps=True, keep_tilt=False)
+"""The firmware up to 2017, UDB4."""
 
 _PARAMS = tuple(
     Column(f.name, (), "see MatrixPilotParams", integer=isinstance(f.default, bool))
@@ -196,31 +200,30 @@ def _store_matrix(R):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def centrifugal(a, w, tilt):  # type: ignore[no-untyped-def]
+def centrifugal(a, q, r, tilt):  # type: ignore[no-untyped-def]
     """Size of the centrifugal acceleration, without GPS (MatrixPilot 2017).
 
     Parameters
     ----------
     a : shape (3,)     gravity minus acceleration, body axes
-    w : shape (3,)     rate
+    q, r : float       pitch and yaw rate as read, without the integral correction
     tilt : shape (3,)  Z row of the attitude
 
     Returns
     -------
-    along, across, size : along * size is the y, -across * size the z component of ``omega x V``, in units of `a`;
-    (across, along) is the direction of pitch and yaw rate.  `a` is in units of gravity
+    n_q, n_r, size : direction of (q, r), and ``omega x V = size (0, n_r, -n_q)``, in units of gravity as `a` is
     """
-    turn = np.sqrt(w[1] * w[1] + w[2] * w[2])
+    turn = np.sqrt(q * q + r * r)
     if turn == 0.0:
         return 0.0, 0.0, 0.0
-    n_q, n_r = w[1] / turn, w[2] / turn
+    n_q, n_r = q / turn, r / turn
     felt = a[2] * n_q - a[1] * n_r
     upright = tilt[2] * n_q - tilt[1] * n_r
     # Along the nose gravity is taken from the attitude: thrust does not disturb it.
     square = felt * felt + 1.0 - a[1] * a[1] - a[2] * a[2] - tilt[0] * tilt[0]
     root = np.sqrt(max(square, 0.0))
     size = felt + root if felt < 0.0 or upright < 0.0 else felt - root
-    return n_r, n_q, max(size, 0.0)
+    return n_q, n_r, max(size, 0.0)
 
 
 @kernel
@@ -235,7 +238,7 @@ def gravity_reference(row, s):  # type: ignore[no-untyped-def]
         v = s.airspeed_m_s / G_M_S2
         y, z = w[2] * v, -w[1] * v  # omega x (V, 0, 0): the paper's Eqns 25-26
     else:
-        n_r, n_q, size = centrifugal(g, w, s.R_eb[2])
+        n_q, n_r, size = centrifugal(g, w[1] - s.omega_i_b[1], w[2] - s.omega_i_b[2], s.R_eb[2])
         s.turn_m_s2 = size * G_M_S2
         y, z = n_r * size, -n_q * size
     g[0] += s.forward_m_s2 / G_M_S2
@@ -294,7 +297,8 @@ def rotate(s):  # type: ignore[no-untyped-def]
         propagate(s.R_eb, theta, 1.0)
         if s.fixed_point:
             _store_matrix(s.R_eb)
-        if not renormalise_keeping_tilt(s.R_eb, s.fixed_point):
+        saved = renormalise_keeping_tilt(s.R_eb, s.fixed_point) if s.keep_tilt else renormalise(s.R_eb)
+        if not saved:
             level(s.R_eb)
             return False
     return True
@@ -334,7 +338,7 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
     s.airspeed_m_s = np.sqrt(x * x + y * y + z * z)
     if s.fixes == 2 and s.forward_acceleration and s.fix_age_s > 0.0:
         s.forward_m_s2 = (s.airspeed_m_s - before) / s.fix_age_s
-    yaw_error(x, y, speed, s)
+    yaw_error(x, y, s)
     s.fix_age_s = 0.0
 
 
@@ -380,13 +384,13 @@ def learn_wind(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def yaw_error(x, y, speed, s):  # type: ignore[no-untyped-def]
+def yaw_error(x, y, s):  # type: ignore[no-untyped-def]
     """Fill ``s.yaw_b`` from the velocity (x, y) through the air, or the course where that is slow (Eqns 23-24)."""
     if x * x + y * y < LEAST_AIRSPEED_M_S**2:
         x, y = s.v_e_m_s[0], s.v_e_m_s[1]
     length = np.hypot(x, y)
     ground = 0.0
-    if speed > s.min_speed_m_s and length > 0.0:
+    if np.hypot(s.v_e_m_s[0], s.v_e_m_s[1]) > s.min_speed_m_s and length > 0.0:
         if s.fixed_point:
             angle = np.rint(np.arctan2(y, x) / COURSE_COUNT_RAD) * COURSE_COUNT_RAD
             x, y, length = np.cos(angle), np.sin(angle), 1.0
