@@ -1,47 +1,43 @@
-"""MatrixPilot's estimator in its present form (2017 and after): the paper's, with a turn that needs no GPS.
-
-One pass per inertial sample, in the firmware's order: free the accelerometer of centrifugal and forward
-acceleration, integrate the gyros, renormalise, compare down with the accelerometer and the nose with the velocity
-through the air, feed both errors back, calibrate the gyros' gain.
+"""MatrixPilot's estimator in its present form (2017 and after): the paper's, with turns that need no GPS.
 
 Frames.  MatrixPilot's body axes are left wing, nose, down, its earth axes west, north, down.  Here everything is in
-our own axes: the equations are rewritten once and nothing is converted in flight.  Its rates and its accelerometer
-(gravity minus acceleration, level at rest +z) read in our axes
+our own axes: the equations are rewritten once and nothing is converted in flight, but for the force:
 
-    omega = (p, q, r) = (omega_y, -omega_x, omega_z),    a = -force_b = (g_y, -g_x, g_z)
+    omega = (p, q, r) = (omega_y, -omega_x, omega_z),    a = gravity - acceleration = -force_b = (a_y, -a_x, a_z)
 
 What differs from the paper (Premerlani & Bizard)
 -------------------------------------------------
-*Centrifugal acceleration without GPS* replaces Eqns 25-26.  It acts at right angles to nose and rate, its direction
-is known from the gyros; its size w_V = |omega x V| is what makes the remaining force as long as gravity:
-``|a + w_V u| = g``.  Of the two roots the sign of the turn chooses.  A steady level turn is a double root.
+*Centrifugal acceleration without GPS* replaces Eqns 25-26.  It acts at right angles to nose and rate, so the gyros
+tell its direction u; its size ``w_V = |omega x V|`` is what makes the remaining force as long as gravity:
+``|a + w_V u| = g``.  Of the two roots the sign of the turn chooses; a steady level turn is a double root.  The
+direction is that of the rate as read, without the integral correction (with it, 2 degrees of tilt off the firmware).
 `centrifugal_from_gps` goes back to Eqns 25-26, with the speed through the air.
 
 *Forward acceleration* is the difference of the airspeed between two GPS reports, held until the next.
 
 *Yaw* meets the velocity through the air, not the course, once the wind is known.  The error is computed at a report
 and held in body axes until the next.  A report is taken for late by one report: course, speed and climb are
-carried on by their last change.
+carried on by their last change.  (In the firmware a speed so carried on below zero is a large unsigned one, and turns
+an aeroplane at rest; here it is zero.)
 
 *Wind* from pairs of reports between which the nose turned: the change of velocity over the ground is that of the
 velocity through the air, whose direction the nose tells.  Yaw found late is a turn that the velocity does not
 make: it leaves a false wind of some metres per second that takes several turns to fade.
 
-*Renormalisation* (2017) leaves the direction of the Z row alone: E = D x N, then N = E x D, and Eqn 21.  The tilt is
-thus not touched, where Eqns 19-20 spread the errors.
+*Renormalisation* (2017) leaves the direction of the Z row as it is: E = D x N, then N = E x D, and Eqn 21.  The error
+of Eqn 17 then tilts the matrix as much as with Eqns 18-20 (`estimator.rotation.renormalise`), to the other side.
 
-*Rotation in a sample* is lengthened to the tangent, which makes Eqn 17 exact in angle, to third order.
+*Rotation in a sample* is lengthened to its tangent: Eqn 17 then turns by the right angle.
 
-*Gains* rise with the spin rate beyond 50 deg/s; the integral rests beyond 20 deg/s.
-
-Eqn 27 stands here in the order that works, reference x estimate (see `estimator.premerlani`, Errata).
+*Gains* rise with the spin rate; the integral rests while turning.  Eqn 27 stands here in the order that works,
+reference x estimate (see `estimator.premerlani`, Errata).
 
 Fixed point
 -----------
 `fixed_point` rounds as the 16-bit processor does: every stored number is a whole count, rounded to the nearest, to
-even where between (convergent), and saturated.  Matrix elements are 2.14; a product of two of them leaves the 1.15
-arithmetic halved and is doubled again, so that 13 bits remain.  Angles of velocities have 8 bits.  The processor's
-sums are exact (40 bits), so that rounding at the stores is all there is.  Counts are those of the UDB4 board.
+even where between (convergent), and saturated; the integral alone has 32 bits.  Matrix elements are 2.14; a product
+of two of them leaves the 1.15 arithmetic halved and is doubled again, so that 13 bits remain.  Angles of velocities
+have 8 bits.  The processor's sums are exact (40 bits).  Counts are those of the UDB4 board.
 
 Left out: angle of attack in the compensation (a model of the wing that the firmware is told), the magnetometer, and
 dead reckoning, which the attitude does not use.
@@ -139,9 +135,8 @@ class MatrixPilotParams:
                     raise ValueError(f"{f.name} is {value}; it must be more than zero")
             elif not 0.0 <= value < math.inf:
                 raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
-        for name in ("gyro_range_rad_s", "force_range_m_s2"):
-            if getattr(self, name) > 1e4:
-                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
+            if f.name.endswith(("range_rad_s", "range_m_s2")) and value > 1e4:
+                raise ValueError(f"{f.name} is {value}; no sensor has that, 10000 is the most")
 
 
 UDB4 = MatrixPilotParams()
@@ -194,12 +189,6 @@ def _store(a, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _store_matrix(R):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        _store(R[i], MATRIX_COUNT)
-
-
-@kernel
 def centrifugal(a, q, r, tilt):  # type: ignore[no-untyped-def]
     """Size of the centrifugal acceleration, without GPS (MatrixPilot 2017).
 
@@ -249,11 +238,6 @@ def gravity_reference(row, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _row_square(R, i):  # type: ignore[no-untyped-def]
-    return R[i, 0] * R[i, 0] + R[i, 1] * R[i, 1] + R[i, 2] * R[i, 2]
-
-
-@kernel
 def _cross_rows(R, i, j, k):  # type: ignore[no-untyped-def]
     """Set row `i` to row `j` x row `k`."""
     x = R[j, 1] * R[k, 2] - R[j, 2] * R[k, 1]
@@ -267,16 +251,16 @@ def renormalise_keeping_tilt(R_eb, fixed_point):  # type: ignore[no-untyped-def]
     """Bring the matrix back to a rotation, in place, the direction of the Z row as it is; False if it cannot be."""
     _cross_rows(R_eb, 1, 2, 0)  # E = D x N
     _cross_rows(R_eb, 0, 1, 2)  # N = E x D
-    if fixed_point:
-        _store_matrix(R_eb)
     for i in range(3):
-        square = _row_square(R_eb, i)
+        if fixed_point:
+            _store(R_eb[i], MATRIX_COUNT)
+        square = R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2
         if not abs(square - 1.0) < 0.1:  # no longer within reach of Eqn 21
             return renormalise(R_eb)
         for j in range(3):
             R_eb[i, j] *= 1.5 - 0.5 * square  # Eqn 21
-    if fixed_point:
-        _store_matrix(R_eb)
+        if fixed_point:
+            _store(R_eb[i], MATRIX_COUNT)
     return True
 
 
@@ -296,7 +280,8 @@ def rotate(s):  # type: ignore[no-untyped-def]
     for _ in range(parts):
         propagate(s.R_eb, theta, 1.0)
         if s.fixed_point:
-            _store_matrix(s.R_eb)
+            for i in range(3):
+                _store(s.R_eb[i], MATRIX_COUNT)
         saved = renormalise_keeping_tilt(s.R_eb, s.fixed_point) if s.keep_tilt else renormalise(s.R_eb)
         if not saved:
             level(s.R_eb)
