@@ -179,13 +179,12 @@ STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + _PARAMS + _STATE)
 @kernel
 def stored(x, count):  # type: ignore[no-untyped-def]
     """`x` as 16 bits of `count` hold it: convergent rounding and saturation."""
-    return count * clip(np.rint(x / count), -32768.0, 32767.0)
+    return count * clip(np.rint(x * (1.0 / count)), -32768.0, 32767.0)
 
 
 @kernel
 def _store(a, count):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        a[i] = stored(a[i], count)
+    a[0], a[1], a[2] = stored(a[0], count), stored(a[1], count), stored(a[2], count)
 
 
 @kernel
