@@ -43,6 +43,7 @@ from typing import TypeVar
 
 ESTIMATORS: dict[str, str] = {
     "premerlani": "estimator.premerlani:Premerlani",
+    "ap_dcm": "estimator.ap_dcm:ApDcm",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
 }
