@@ -55,7 +55,7 @@ from estimator.screening import (
 
 LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost
 SPIN_LIMIT_RAD_S = math.radians(20.0)  # no offset is learnt while turning faster
-LEARN_S = 5.0  # the integral moves once in so much time of slow rotation
+LEARN_S = 5.01  # the integral moves once in so much time of slow rotation
 YAW_LEARN_S = 2.0  # a yaw reference older than this teaches no offset
 NO_GPS_S = 0.2  # interval of correction without GPS
 YAW_DECAY, YAW_DECAY_S = 0.97, 0.02  # of the proportional yaw term, in each sample without a reference at 50 Hz
@@ -320,7 +320,7 @@ def compass_error(m, s):  # type: ignore[no-untyped-def]
     north = s.R_eb[0, 0] * m[0] + s.R_eb[0, 1] * m[1] + s.R_eb[0, 2] * m[2]  # Eqn 3.1
     east = s.R_eb[1, 0] * m[0] + s.R_eb[1, 1] * m[1] + s.R_eb[1, 2] * m[2]
     if not s.yaw_found:
-        set_heading(s, _yaw(s.R_euler_eb) + s.declination_rad - np.arctan2(east, north))
+        set_heading(s, _yaw(s.R_eb) + s.declination_rad - np.arctan2(east, north))
         return 0.0
     length = np.sqrt(north * north + east * east)
     if length < 1e-9:  # it points straight down: no direction
@@ -447,14 +447,19 @@ def delay_force(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
-    """Average the specific force in the earth frame; at the end of an interval correct by it (Eqns 3.6-3.12)."""
+def sum_force(row, s, good):  # type: ignore[no-untyped-def]
+    """Add the sample to the mean specific force of the interval, seen from the earth (Eqns 3.6 and 3.7)."""
     f = row.force_b_m_s2
     s.interval_s += s.dt_s
     if good & FORCE_GOOD:
         s.force_s += s.dt_s
         for i in range(3):
             s.force_sum_e_m_s[i] += (s.R_eb[i, 0] * f[0] + s.R_eb[i, 1] * f[1] + s.R_eb[i, 2] * f[2]) * s.dt_s
+
+
+@kernel
+def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
+    """At the end of an interval, correct by its mean specific force (Eqns 3.8-3.12)."""
     if not end_of_interval(row, s):
         return
     if s.force_s > 0.5 * s.interval_s:  # else too little of the interval was felt
@@ -463,7 +468,7 @@ def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
         s.error_b[0] = s.error_b[1] = s.error_b[2] = 0.0
     gain = s.kp * spin_gain(s)
     slow = s.fix_age_s <= FIX_LIFE_S and s.speed_m_s < MIN_SPEED_M_S
-    if s.fly_forward and slow and good & FORCE_GOOD and f[0] >= LAUNCH_M_S2 and abs(s.R_euler_eb[2, 0]) < 0.5:
+    if s.fly_forward and slow and good & FORCE_GOOD and row.force_b_m_s2[0] >= LAUNCH_M_S2 and abs(s.R_euler_eb[2, 0]) < 0.5:
         gain *= 0.5  # thrown, at less than 30 degrees of pitch
     for i in range(3):
         s.omega_p_b[i] = gain * s.error_b[i]  # Eqn 3.11
@@ -554,6 +559,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             s.lock = 0  # nor does the old velocity belong to the new interval
         else:
             turn(row, s, good)
+            sum_force(row, s, good)  # before a heading is set: the interval was felt in the frame of until now
             correct_yaw(row, s)
             correct_by_force(row, s, good)
     if s.rejected != before:
