@@ -189,8 +189,10 @@ _STATE = (
     Column("fix_age_s", (), "time since it"),
     Column("course_rad", (), "its course"),
     Column("speed_m_s", (), "its ground speed"),
-    Column("new_field", (), "1 where a usable magnetometer sample arrived in this tick", integer=True),
+    Column("new_course", (), "1 while the last fix has not corrected yaw", integer=True),
+    Column("field_b_ut", (3,), "last usable magnetometer sample"),
     Column("field_age_s", (), "time since it"),
+    Column("new_field", (), "1 while it has not corrected yaw", integer=True),
     Column("airspeed_m_s", (), "last airspeed measured, or of the last fix less the wind"),
     Column("air_age_s", (), "time since the last one measured"),
     Column("off_course_s", (), "how long the compass has been off the course"),
@@ -230,17 +232,19 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
     s.fix_age_s += s.dt_s
     s.field_age_s += s.dt_s
     s.air_age_s += s.dt_s
-    s.new_fix = s.new_field = 0
+    s.new_fix = 0
     if row.gps_new:
         v, course, speed = row.gps_v_e_m_s, row.gps_course_rad, row.gps_speed_m_s
         if max(abs(v[0]), abs(v[1]), abs(v[2])) < 1000.0 and abs(course) < 100.0 and 0.0 <= speed < 1000.0:
-            s.new_fix, s.fix_age_s, s.course_rad, s.speed_m_s = 1, 0.0, course, speed
+            s.new_fix, s.new_course, s.fix_age_s, s.course_rad, s.speed_m_s = 1, 1, 0.0, course, speed
         else:
             s.rejected += 1
     if row.mag_new and s.use_compass:
         m = row.mag_b_ut
         if 0.0 < m[0] * m[0] + m[1] * m[1] + m[2] * m[2] < 1e8:
             s.new_field, s.field_age_s = 1, 0.0
+            for i in range(3):
+                s.field_b_ut[i] = m[i]
         else:
             s.rejected += 1
     if row.air_new:
@@ -315,8 +319,9 @@ def judge_compass(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def compass_error(m, s):  # type: ignore[no-untyped-def]
-    """Earth-frame yaw error of the magnetometer `m` (Eqns 3.1 and 3.2); sets the heading the first time."""
+def compass_error(s):  # type: ignore[no-untyped-def]
+    """Earth-frame yaw error of the magnetometer (Eqns 3.1 and 3.2); sets the heading the first time."""
+    m = s.field_b_ut
     north = s.R_eb[0, 0] * m[0] + s.R_eb[0, 1] * m[1] + s.R_eb[0, 2] * m[2]  # Eqn 3.1
     east = s.R_eb[1, 0] * m[0] + s.R_eb[1, 1] * m[1] + s.R_eb[1, 2] * m[2]
     if not s.yaw_found:
@@ -341,17 +346,19 @@ def course_error(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def correct_yaw(row, s):  # type: ignore[no-untyped-def]
+def correct_yaw(s):  # type: ignore[no-untyped-def]
     """Yaw correction by compass or course (Eqns 3.3-3.5): body z alone is corrected."""
     judge_compass(s)
     if s.compass and s.new_field:
-        since_s = s.clock_s - s.compass_yaw_s
-        error = compass_error(row.mag_b_ut, s)
-        s.compass_yaw_s = s.clock_s
-    elif not s.compass and s.fly_forward and s.new_fix and s.speed_m_s >= MIN_SPEED_M_S:
-        since_s = s.clock_s - s.course_yaw_s
+        now_s = s.clock_s - s.field_age_s
+        since_s = now_s - s.compass_yaw_s
+        error = compass_error(s)
+        s.compass_yaw_s, s.new_field = now_s, 0
+    elif not s.compass and s.fly_forward and s.new_course and s.speed_m_s >= MIN_SPEED_M_S:
+        now_s = s.clock_s - s.fix_age_s
+        since_s = now_s - s.course_yaw_s
         error = course_error(s)
-        s.course_yaw_s = s.clock_s
+        s.course_yaw_s, s.new_course = now_s, 0
     else:
         s.omega_yaw_p *= YAW_DECAY if s.decay_per_sample else YAW_DECAY ** (s.dt_s / YAW_DECAY_S)
         return
@@ -560,7 +567,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         else:
             turn(row, s, good)
             sum_force(row, s, good)  # before a heading is set: the interval was felt in the frame of until now
-            correct_yaw(row, s)
+            correct_yaw(s)
             correct_by_force(row, s, good)
     if s.rejected != before:
         return 2  # Health.POOR
