@@ -55,9 +55,9 @@ from estimator.screening import (
 
 LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost
 SPIN_LIMIT_RAD_S = math.radians(20.0)  # no offset is learnt while turning faster
-LEARN_S = 5.01  # the integral moves once in so much time of slow rotation
+LEARN_S = 5.0 + 1e-5  # the integral moves once in so much slow rotation: 25 fixes of 0.2 s in float32 just miss it
 YAW_LEARN_S = 2.0  # a yaw reference older than this teaches no offset
-NO_GPS_S = 0.2  # interval of correction without GPS
+NO_GPS_S = 0.2 - 1e-5  # interval of correction without GPS: 20 samples of 10 ms just reach it
 YAW_DECAY, YAW_DECAY_S = 0.97, 0.02  # of the proportional yaw term, in each sample without a reference at 50 Hz
 MIN_SPEED_M_S = 3.0  # slowest ground speed with a course
 LOST_S, LOST_M_S, LOST_RAD = 20.0, 9.0, 1.047  # heading is set to the course after so long, or if fast and so far off
@@ -474,9 +474,8 @@ def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
     else:
         s.error_b[0] = s.error_b[1] = s.error_b[2] = 0.0
     gain = s.kp * spin_gain(s)
-    slow = s.fix_age_s <= FIX_LIFE_S and s.speed_m_s < MIN_SPEED_M_S
-    if s.fly_forward and slow and good & FORCE_GOOD and row.force_b_m_s2[0] >= LAUNCH_M_S2 and abs(s.R_euler_eb[2, 0]) < 0.5:
-        gain *= 0.5  # thrown, at less than 30 degrees of pitch
+    if good & FORCE_GOOD and thrown(row.force_b_m_s2[0], s):
+        gain *= 0.5
     for i in range(3):
         s.omega_p_b[i] = gain * s.error_b[i]  # Eqn 3.11
         if s.spin_rad_s < SPIN_LIMIT_RAD_S:
@@ -494,6 +493,13 @@ def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
     forget_interval(s)
     for i in range(3):
         s.v_last_e_m_s[i] = s.v_e_m_s[i]
+
+
+@kernel
+def thrown(forward_m_s2, s):  # type: ignore[no-untyped-def]
+    """Whether an aeroplane that is not fast yet is pushed forward, at less than 30 degrees of pitch."""
+    slow = s.fix_age_s <= FIX_LIFE_S and s.speed_m_s < MIN_SPEED_M_S
+    return s.fly_forward and slow and forward_m_s2 >= LAUNCH_M_S2 and abs(s.R_euler_eb[2, 0]) < 0.5
 
 
 @kernel
