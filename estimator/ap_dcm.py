@@ -30,126 +30,33 @@ W. Premerlani, "Roll-pitch gyro drift compensation", 2011, Eqns 3-5.   W. Premer
 """
 
 import math
-from dataclasses import dataclass, fields
-from enum import StrEnum
+from dataclasses import fields
 from typing import Any, ClassVar
 
 import numpy as np
 
+from estimator.ap_dcm_params import JULY_2013, MOST_FIXES, ApDcmParams, Quirk
+from estimator.ap_dcm_wind import AIR_LIFE_S, learn_wind
 from estimator.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.kernels import clip, wrap
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate
-from estimator.screening import (
-    FORCE_GOOD,
-    FORCE_RANGE_M_S2,
-    G_M_S2,
-    GYRO_RANGE_RAD_S,
-    SCREEN,
-    attitude_at_rest,
-    offset_at_rest,
-    screen,
-    take_rate,
-)
+from estimator.screening import FORCE_GOOD, G_M_S2, SCREEN, attitude_at_rest, offset_at_rest, screen, take_rate
 
 LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost
 SPIN_LIMIT_RAD_S = math.radians(20.0)  # no offset is learnt while turning faster
 LEARN_S = 5.0 + 1e-5  # the integral moves once in so much slow rotation: 25 fixes of 0.2 s in float32 just miss it
 YAW_LEARN_S = 2.0  # a yaw reference older than this teaches no offset
 NO_GPS_S = 0.2 - 1e-5  # interval of correction without GPS: 20 samples of 10 ms just reach it
-YAW_DECAY, YAW_DECAY_S = 0.97, 0.02  # of the proportional yaw term, in each sample without a reference at 50 Hz
+YAW_DECAY = 0.97  # of the proportional yaw term, in each sample without a reference
+YAW_FADE_HZ = -50.0 * math.log(YAW_DECAY)  # the same at any sample rate, as it was at 50 Hz
 MIN_SPEED_M_S = 3.0  # slowest ground speed with a course
 LOST_S, LOST_M_S, LOST_RAD = 20.0, 9.0, 1.047  # heading is set to the course after so long, or if fast and so far off
-OFF_COURSE_RAD, OFF_COURSE_S = math.radians(45.0), 2.0  # a compass this far off the course, for so long, is not used
+COS_OFF_COURSE, OFF_COURSE_S = math.cos(math.radians(45.0)), 2.0  # a compass so far off for so long is not used
 LAUNCH_M_S2 = 7.0  # forward specific force of a throw
 CLIP_G = 0.5
-FIX_LIFE_S, FIELD_LIFE_S, AIR_LIFE_S = 2.0, 0.5, 1.0  # an older sample is none
-MOST_FIXES = 5
-WIND_RESTART_S, WIND_STRAIGHT_S = 10.0, 2.0
-WIND_TURN, WIND_JUMP_M_S = 0.2, 20.0  # least change of the nose, and largest step believed
-
-
-class Quirk(StrEnum):
-    """Something the original did and the mended algorithm does not; the value is its name in settings and state."""
-
-    UNWRAPPED_COURSE = "unwrapped_course"
-    """The course is 0..2 pi and the yaw -pi..pi, their difference is not wrapped: on courses of 180 to 300 degrees
-    heading is set to the course at every fix instead of being corrected."""
-    STALE_EULER = "stale_euler"
-    """Roll, pitch and yaw, where angles are used, are those of the sample before: setting the heading to the course
-    loses a sample of roll and pitch."""
-    VERTICAL_CLIP = "vertical_clip"
-    """The vertical part of the change of velocity is limited to half a g: wrong in loops and steep turns entered."""
-    STUCK_P_GAIN = "stuck_p_gain"
-    """The gain that should grow from 50 to 500 deg/s compares rad/s with degrees of degrees, and is always one."""
-    SHORT_FORCE = "short_force"
-    """A mean specific force of less than one g keeps its length instead of being normalised."""
-    DECAY_PER_SAMPLE = "decay_per_sample"
-    """The proportional yaw term fades by 3 % a sample whatever the sample rate, instead of that at 50 Hz."""
-    HASTY_COMPASS = "hasty_compass"
-    """A compass off the course is dropped at once, without waiting two seconds."""
-    COMPASS_IS_NO_YAW = "compass_is_no_yaw"
-    """After 20 s of compass the first course counts as the first yaw information in 20 s: heading is set to it."""
-    OVERWRITTEN_WIND = "overwritten_wind"
-    """The wind estimate overwrites the older nose and velocity before it forms the sums with them."""
-
-
-JULY_2013: frozenset[Quirk] = frozenset(Quirk)
-"""All quirks: the original."""
-
-
-@dataclass(frozen=True, slots=True)
-class ApDcmParams:
-    """Settings; the defaults of gains and limits are those of 2013.
-
-    quirks : frozenset of Quirk   what of the original is not mended
-    kp, ki : float              roll-pitch gains, 1/s and 1/s^2 per unit of (sine) error; ArduPilot's AHRS_RP_P.
-                                Large: errors go quickly, but accelerations and wind get in
-    kp_yaw, ki_yaw : float      the same for yaw; AHRS_YAW_P
-    gyro_drift_rad_s2 : float   how fast the gyro offset is allowed to drift, per axis
-    gps_gain : float            share of the GPS acceleration that is believed, 0..1; AHRS_GPS_GAIN
-    gps_delay_fixes : int       fixes by which the GPS velocity is late, 0..5: the specific force is compared that
-                                much later (AHRS_GPS_DELAY, November 2013; its default there was 2)
-    use_compass : bool          take the magnetometer for yaw when it arrives; else, or without one, the course
-    declination_rad : float     of the magnetic field, east positive
-    fly_forward : bool          an aeroplane: its course may stand for its heading, its airspeed for its motion
-    estimate_wind : bool        learn the wind from turns, and from airspeed where there is a sensor
-    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
-    """
-
-    quirks: frozenset[Quirk] = frozenset()
-    kp: float = 0.3
-    ki: float = 0.0087
-    kp_yaw: float = 0.3
-    ki_yaw: float = 0.01
-    gyro_drift_rad_s2: float = math.radians(0.5 / 60.0)
-    gps_gain: float = 1.0
-    gps_delay_fixes: int = 0
-    use_compass: bool = True
-    declination_rad: float = 0.0
-    fly_forward: bool = True
-    estimate_wind: bool = True
-    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
-    force_range_m_s2: float = FORCE_RANGE_M_S2
-
-    def __post_init__(self) -> None:
-        unknown = sorted(set(self.quirks) - JULY_2013)
-        if unknown:
-            raise ValueError(f"quirks has {unknown[0]!r}; there are {', '.join(sorted(JULY_2013))}")
-        for name in ("kp", "ki", "kp_yaw", "ki_yaw", "gyro_drift_rad_s2"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, zero or more")
-        if not 0.0 <= self.gps_gain <= 1.0:
-            raise ValueError(f"gps_gain is {self.gps_gain}; it must be 0 to 1")
-        if self.gps_delay_fixes not in range(MOST_FIXES + 1):
-            raise ValueError(f"gps_delay_fixes is {self.gps_delay_fixes}; it must be a whole number, 0 to {MOST_FIXES}")
-        if not abs(self.declination_rad) <= math.pi:
-            raise ValueError(f"declination_rad is {self.declination_rad} rad; it must be -pi to pi")
-        for name in ("gyro_range_rad_s", "force_range_m_s2"):
-            if not 0.0 < getattr(self, name) <= 1e4:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be more than zero, 10000 at most")
-
+FIX_LIFE_S, FIELD_LIFE_S = 2.0, 0.5  # an older sample is none
 
 _OF_SCREEN = ("gyro_range_rad_s", "force_range_m_s2")
 _SETTINGS = tuple(f for f in fields(ApDcmParams) if f.name != "quirks")
@@ -188,6 +95,7 @@ _STATE = (
     Column("new_fix", (), "1 where a usable fix arrived in this tick", integer=True),
     Column("fix_age_s", (), "time since it"),
     Column("course_rad", (), "its course"),
+    Column("course", (2,), "the same as a unit vector, north and east"),
     Column("speed_m_s", (), "its ground speed"),
     Column("new_course", (), "1 while the last fix has not corrected yaw", integer=True),
     Column("field_b_ut", (3,), "last usable magnetometer sample"),
@@ -221,8 +129,9 @@ def renormalise_exactly(R_eb):  # type: ignore[no-untyped-def]
         length = np.sqrt(R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2)
         if not 1e-6 < length < 1e6:
             return False
+        scale = 1.0 / length
         for j in range(3):
-            R_eb[i, j] /= length  # Eqn 2.6
+            R_eb[i, j] *= scale  # Eqn 2.6
     return True
 
 
@@ -237,6 +146,7 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
         v, course, speed = row.gps_v_e_m_s, row.gps_course_rad, row.gps_speed_m_s
         if max(abs(v[0]), abs(v[1]), abs(v[2])) < 1000.0 and abs(course) < 100.0 and 0.0 <= speed < 1000.0:
             s.new_fix, s.new_course, s.fix_age_s, s.course_rad, s.speed_m_s = 1, 1, 0.0, course, speed
+            s.course[0], s.course[1] = np.cos(course), np.sin(course)
         else:
             s.rejected += 1
     if row.mag_new and s.use_compass:
@@ -265,7 +175,8 @@ def turn(row, s, good):  # type: ignore[no-untyped-def]
     for i in range(3):
         total[i] = w[i] + s.omega_p_b[i]
     total[2] += s.omega_yaw_p
-    _copy(s.R_eb, s.R_euler_eb)
+    if s.stale_euler:
+        _copy(s.R_eb, s.R_euler_eb)
     angle_rad = s.dt_s * np.sqrt(total[0] * total[0] + total[1] * total[1] + total[2] * total[2])
     parts = 1 + int(min(angle_rad / LONGEST_STEP_RAD, 1000.0))
     for _ in range(parts):
@@ -311,9 +222,9 @@ def judge_compass(s):  # type: ignore[no-untyped-def]
     """Set ``s.compass``: not if far off a course that wind alone cannot explain."""
     off = False
     if s.fly_forward and s.fix_age_s <= FIX_LIFE_S and s.speed_m_s >= MIN_SPEED_M_S:
-        w = s.wind_e_m_s
-        calm = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) < 0.8 * s.speed_m_s
-        off = calm and abs(wrap(_yaw(s.R_euler_eb) - s.course_rad)) > OFF_COURSE_RAD
+        w, x, y = s.wind_e_m_s, s.R_euler_eb[0, 0], s.R_euler_eb[1, 0]
+        calm = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < (0.8 * s.speed_m_s) ** 2
+        off = calm and x * s.course[0] + y * s.course[1] < COS_OFF_COURSE * np.sqrt(x * x + y * y)
     s.off_course_s = s.off_course_s + s.dt_s if off else 0.0
     s.compass = s.field_age_s <= FIELD_LIFE_S and s.off_course_s <= (0.0 if s.hasty_compass else OFF_COURSE_S)
 
@@ -360,7 +271,7 @@ def correct_yaw(s):  # type: ignore[no-untyped-def]
         error = course_error(s)
         s.course_yaw_s, s.new_course = now_s, 0
     else:
-        s.omega_yaw_p *= YAW_DECAY if s.decay_per_sample else YAW_DECAY ** (s.dt_s / YAW_DECAY_S)
+        s.omega_yaw_p *= YAW_DECAY if s.decay_per_sample else np.exp(-YAW_FADE_HZ * s.dt_s)
         return
     error *= s.R_eb[2, 2]  # Eqn 3.3
     s.omega_yaw_p = s.kp_yaw * spin_gain(s) * error  # Eqn 3.4
@@ -511,55 +422,6 @@ def forget_interval(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def learn_wind(s):  # type: ignore[no-untyped-def]
-    """Learn the wind from the change of velocity that goes with a change of the nose, or straight from airspeed.
-
-    Through still air a turn takes the velocity V f to V f_last: V and the wind are what two such velocities share.
-    """
-    v, f, v0, f0, wind = s.v_e_m_s, s.R_eb[:, 0], s.v_wind_e_m_s, s.nose_last, s.wind_e_m_s
-    since_s = s.clock_s - s.wind_s
-    turned = np.sqrt((f[0] - f0[0]) ** 2 + (f[1] - f0[1]) ** 2 + (f[2] - f0[2]) ** 2)
-    if since_s > WIND_RESTART_S:
-        remember_nose(s)
-    elif turned > WIND_TURN:
-        airspeed = np.sqrt((v[0] - v0[0]) ** 2 + (v[1] - v0[1]) ** 2 + (v[2] - v0[2]) ** 2) / turned
-        angle = np.arctan2(v[1] - v0[1], v[0] - v0[0]) - np.arctan2(f[1] - f0[1], f[0] - f0[0])
-        if s.overwritten_wind:
-            remember_nose(s)
-        c, z = airspeed * np.cos(angle), airspeed * np.sin(angle)
-        fx, fy, fz = f[0] + f0[0], f[1] + f0[1], f[2] + f0[2]
-        x = 0.5 * (v[0] + v0[0] - (c * fx - z * fy))
-        y = 0.5 * (v[1] + v0[1] - (z * fx + c * fy))
-        down = 0.5 * (v[2] + v0[2] - airspeed * fz)
-        known = np.sqrt(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2])
-        if np.sqrt(x * x + y * y + down * down) < known + WIND_JUMP_M_S:
-            blend_wind(s, 0.05, x, y, down)
-        remember_nose(s)
-    elif since_s > WIND_STRAIGHT_S and s.air_age_s <= AIR_LIFE_S:
-        a = s.airspeed_m_s
-        blend_wind(s, 0.08, v[0] - a * f[0], v[1] - a * f[1], v[2] - a * f[2])
-
-
-@kernel
-def remember_nose(s):  # type: ignore[no-untyped-def]
-    """Keep the nose and the velocity of now for the next wind estimate."""
-    s.wind_s = s.clock_s
-    for i in range(3):
-        s.nose_last[i] = s.R_eb[i, 0]
-        s.v_wind_e_m_s[i] = s.v_e_m_s[i]
-
-
-@kernel
-def blend_wind(s, share, x, y, z):  # type: ignore[no-untyped-def]
-    """Move the wind estimate by `share` towards the one just measured."""
-    wind = s.wind_e_m_s
-    wind[0] += share * (x - wind[0])
-    wind[1] += share * (y - wind[1])
-    wind[2] += share * (z - wind[2])
-    s.wind_known = 1
-
-
-@kernel
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One inertial sample, in the original's order; returns the `Health`."""
     row, s = rows[k], state[0]
@@ -624,3 +486,10 @@ class ApDcm(Compiled):
         s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
         s["fix_age_s"] = s["field_age_s"] = s["air_age_s"] = math.inf
         s["wind_s"] = s["compass_yaw_s"] = s["course_yaw_s"] = -math.inf
+
+
+class ApDcm2013(ApDcm):
+    """The original of 12 July 2013: `ApDcm` with all quirks."""
+
+    def __init__(self) -> None:
+        super().__init__(ApDcmParams(quirks=JULY_2013))

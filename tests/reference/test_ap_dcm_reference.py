@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from estimator.ap_dcm import JULY_2013, ApDcm, ApDcmParams, Quirk
-from estimator.interface import Measurements
+from estimator.interface import MEASURED_DTYPE, Measurements
 from estimator.kernels import wrap
 from estimator.rotation import inclination_error_rad, rotation_error_rad, to_euler
 from scenarios.harness.logs import reference
@@ -97,7 +98,7 @@ def test_van_zundert_target_of_half_a_degree_is_met():
 
 
 def replay_integral_by_hand(case, *, set_integral, earth_frame):
-    """E100 with the integral of van Zundert's section 3 kept here, in place of the estimator's own.
+    """The bench case with the integral of van Zundert's section 3 kept here, in place of the estimator's own.
 
     set_integral : the integral is set to the saturated sum, as the report has it; else the sum is added to it
     earth_frame : the error is integrated in the earth frame, Eqn 3.12 as printed; else in the body frame
@@ -112,8 +113,8 @@ def replay_integral_by_hand(case, *, set_integral, earth_frame):
         after = estimator.snapshot()
         old, new = before[0], after[0]
         slow = new["spin_rad_s"] < np.radians(20.0)
-        since_s = new["compass_yaw_s"] - old["compass_yaw_s"]
-        if slow and 0.0 < since_s < 2.0:
+        if slow and new["compass_yaw_s"] > old["compass_yaw_s"] > 0.0:
+            since_s = new["compass_yaw_s"] - old["compass_yaw_s"]
             total[2] += p.ki_yaw * since_s * new["omega_yaw_p"] / p.kp_yaw  # Eqns 3.4 and 3.5
         if slow and old["begun"] and new["interval_s"] == 0.0:
             interval_s = old["interval_s"] + new["dt_s"]
@@ -130,14 +131,47 @@ def replay_integral_by_hand(case, *, set_integral, earth_frame):
     return attitudes
 
 
-# Measured: 0.013 (the original), 0.50, 0.71 and 0.97 degrees.
 @pytest.mark.parametrize(
     ("set_integral", "earth_frame", "low_deg", "high_deg"),
-    [(False, False, 0.0, 0.02), (True, False, 0.4, 0.6), (False, True, 0.6, 0.8), (True, True, 0.85, 1.1)],
+    [(False, False, 0.0, 0.02), (True, False, 0.0, 0.02), (False, True, 0.1, 0.25)],
+)
+def test_van_zundert_misreadings_on_a_minute_of_bench(set_integral, earth_frame, low_deg, high_deg):
+    """E100 turns slowly enough to learn for 8 s of its 60: the integral moves once, and set is the same as added.
+
+    Measured: 0.013 degrees at most with Eqn 3.12 in the body frame (the code), 0.16 in the earth frame (the report).
+    """
+    case = load("E100 mag")
+    attitudes = replay_integral_by_hand(case, set_integral=set_integral, earth_frame=earth_frame)
+    _, largest = difference_deg(attitudes, case.original_R_eb)
+    assert low_deg <= largest <= high_deg
+
+
+def two_minutes_of_bench():
+    """Turned by hand at up to 49 deg/s for 120 s at 100 Hz, with the gyro offsets of E100 and a perfect compass."""
+    dt_s, n = 0.01, 12000
+    t_s = dt_s * np.arange(n + 1)
+    angles = [90.0 * np.sin(t_s / 4.6) + 90.0, 40.0 * np.sin(t_s / 2.1 + 1.0), 60.0 * np.sin(t_s / 1.75)]
+    attitude = Rotation.from_euler("ZYX", np.transpose(angles), degrees=True)
+    rows = np.zeros(n, MEASURED_DTYPE)
+    rows["t_s"], rows["dt_s"] = t_s[1:], dt_s
+    rows["gyro_b_rad_s"] = (attitude[:-1].inv() * attitude[1:]).as_rotvec() / dt_s + np.radians([0.8, -0.6, 0.5])
+    rows["force_b_m_s2"] = attitude[1:].inv().apply([0.0, 0.0, -9.80665])
+    rows["mag_new"][9::10] = 1
+    rows["mag_b_ut"] = attitude[1:].inv().apply([20.0, 0.0, 44.0])
+    return Case(rows, make("E100 mag").replay(rows)["R_eb"], attitude[1:].as_matrix())
+
+
+@pytest.mark.parametrize(
+    ("set_integral", "earth_frame", "low_deg", "high_deg"),
+    [(False, False, 0.0, 1e-9), (True, False, 0.8, 1.4), (False, True, 1.2, 2.0), (True, True, 1.2, 2.0)],
 )
 def test_van_zundert_missed_his_target_by_two_misreadings(set_integral, earth_frame, low_deg, high_deg):
-    """Each of the two sentences of his report that the code contradicts costs half a degree or more on his bench."""
-    case = load("E100 mag")
+    """In two minutes of bench each of two sentences of his report costs more than the half degree that he aimed at.
+
+    The original is `ap_dcm` here, which is it to 0.02 degrees.  Measured: set instead of added, 1.1 degrees; the error
+    integrated in the earth frame, 1.6; both, 1.6.  No misreading: the integral kept here is the estimator's own.
+    """
+    case = two_minutes_of_bench()
     attitudes = replay_integral_by_hand(case, set_integral=set_integral, earth_frame=earth_frame)
     _, largest = difference_deg(attitudes, case.original_R_eb)
     assert low_deg <= largest <= high_deg
