@@ -32,6 +32,7 @@ class RecordedLog:
     rows : shape (N,), MEASURED_DTYPE, times increasing
     name : of the file            instruments : those that the log has
     reference : or None           repairs : what was repaired and how often, a line each
+    place : latitude and longitude of the origin of positions, degrees, where known
     """
 
     rows: NDArray[Any]
@@ -39,3 +40,4 @@ class RecordedLog:
     instruments: tuple[str, ...]
     reference: Reference | None = None
     repairs: tuple[str, ...] = ()
+    place: tuple[float, float] | None = None
