@@ -182,12 +182,12 @@ def _put(data: dict[str, Any], name: str, value: Any) -> None:
     if not rest:
         data[head] = value
     elif head == "estimator_params":
-        data[head] = {**data[head], rest: _literal(value)}
+        data[head] = {**data[head], rest: literal(value)}
     else:
         data[head] = {**data[head], rest: value}
 
 
-def _literal(value: Any) -> Any:
+def literal(value: Any) -> Any:
     """Number, truth value or list that `value` spells, else the text itself."""
     try:
         return json.loads(value) if isinstance(value, str) else value

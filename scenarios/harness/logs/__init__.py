@@ -4,19 +4,22 @@ One module per format; each has ``read(path, ...) -> RecordedLog``.  `read` pick
 """
 
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
+from scenarios.harness.logs import checks, column_map
+from scenarios.harness.logs import reference as vectors
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
-_TEXT = (".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz")
-FORMATS = {
-    "a folder or .parquet": "a recording of ours",
-    "*_in.csv.gz": "reference vectors",
-    ".csv .txt .tsv (.gz)": "columns of numbers",
-    ".mat": "MATLAB",
-    ".bin": "ArduPilot DataFlash",
-    ".ulg": "PX4 ULog",
+_BY_MAP = {  # columns of numbers, which a column map explains
+    **dict.fromkeys((".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz"), "text"),
+    ".mat": "matlab",
 }
+_OF_THEMSELVES = {".parquet": "ours", ".bin": "dataflash", ".ulg": "ulog"}  # formats that say what they hold
+KINDS = (
+    "a folder or .parquet is a recording of ours, *_in.csv.gz reference vectors, .csv .txt .tsv (.gz) and .mat hold "
+    "columns, .bin is ArduPilot's, .ulg PX4's"
+)
 
 
 def read(path: Path, *, reference: Path | None = None, columns: str | None = None) -> RecordedLog:
@@ -34,8 +37,6 @@ def read(path: Path, *, reference: Path | None = None, columns: str | None = Non
     """
     if not path.exists():
         raise LogError(f"no log at {path}: there is no such file")
-    from scenarios.harness.logs import checks, column_map, reference as vectors
-
     if columns is None and vectors.is_reference(path):
         return checks.mended(vectors.read(path, reference), path)
     log = _read(path, None if columns is None else column_map.load(columns))
@@ -49,25 +50,14 @@ def read(path: Path, *, reference: Path | None = None, columns: str | None = Non
     return log
 
 
-def _read(path: Path, meanings: "column_map.ColumnMap | None") -> RecordedLog:  # noqa: F821 - imported when needed
-    from scenarios.harness.logs import checks, matlab, ours, text
-
+def _read(path: Path, meanings: column_map.ColumnMap | None) -> RecordedLog:
     name = path.name.lower()
-    if name.endswith(_TEXT):
-        return text.read(path, meanings)
-    if name.endswith(".mat"):
-        return matlab.read(path, meanings)
+    for ending, module in _BY_MAP.items():
+        if name.endswith(ending):
+            return import_module(f"{__name__}.{module}").read(path, meanings)
     if meanings is not None:
         raise LogError(f"{path}: a column map is for text and MATLAB files")
-    if path.is_dir() or name.endswith(".parquet"):
-        return ours.read(path)
-    if name.endswith(".bin"):
-        from scenarios.harness.logs import dataflash
-
-        return checks.mended(dataflash.read(path), path)
-    if name.endswith(".ulg"):
-        from scenarios.harness.logs import ulog
-
-        return checks.mended(ulog.read(path), path)
-    kinds = "; ".join(f"{kind}: {what}" for kind, what in FORMATS.items())
-    raise LogError(f"{path}: unknown kind of log ({kinds})")
+    for ending, module in {**_OF_THEMSELVES, **({name: "ours"} if path.is_dir() else {})}.items():
+        if name.endswith(ending):
+            return checks.mended(import_module(f"{__name__}.{module}").read(path), path)
+    raise LogError(f"{path}: unknown kind of log; {KINDS}")

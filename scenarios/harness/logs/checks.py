@@ -1,6 +1,7 @@
 """What may be wrong in a log, whatever its format: mended and counted, or refused with the row and the column.
 
-Mended: rows without a number in time, gyro or accelerometer are left out; rows late by up to a second are sorted,
+Mended: rows without a number in time, gyro or accelerometer, and rows of zeros before the first reading, are left
+out, GPS fixes, magnetic and air samples without a number too; rows late by up to a second are sorted,
 repeated times left out; times in milli-, micro- or nanoseconds, rates in degrees and forces in g are converted.
 Told: gaps.  Refused: a column without a number, a clock that runs back, more rows bad than good, an accelerometer
 with the opposite sign, whatever is no inertial unit's at all.
@@ -26,7 +27,11 @@ FASTEST_HZ = 20_000.0
 FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
 _DEGREES = 180.0 / np.pi
-_NEW = ("gps_new", "mag_new", "air_new")
+_ARRIVALS = (
+    ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s")),
+    ("mag_new", "magnetic samples", ("mag_b_ut",)),
+    ("air_new", "air-data samples", ("airspeed_m_s",)),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +40,7 @@ class Source:
 
     path: Path
     columns: Mapping[str, str] = field(default_factory=dict)
-    row: Callable[[int], str] = lambda k: f"row {k + 1}"  # noqa: E731 - a default, to be called
+    row: Callable[[int], str] = lambda k: f"row {k + 1}"
 
     def column(self, quantity: str) -> str:
         """The file's own name of `quantity`."""
@@ -82,6 +87,10 @@ def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list
             first = int(np.flatnonzero(bad)[0])
             repairs.append(f"{source.column(name)}: {bad.sum()} without a number left out, first {source.row(first)}")
             good &= ~bad
+    empty = np.logical_and.accumulate(np.all([values == 0.0 for values in numbers.values()], axis=0))
+    if empty.any():
+        repairs.append(f"{empty.sum()} rows of zeros before the first reading left out, first {source.row(0)}")
+        good &= ~empty
     if 2 * good.sum() < n:
         first = int(np.flatnonzero(~good)[0])
         raise LogError(f"{source.path}: {n - good.sum()} of {n} rows lack a number, the first is {source.row(first)}")
@@ -120,7 +129,7 @@ def mended(log: RecordedLog, path: Path) -> RecordedLog:
     if len(keep) < len(rows) or np.any(np.diff(keep) != 1):
         moved = rows[keep]
         in_order = np.all(np.diff(keep) > 0)
-        for name in _NEW if in_order else ():  # what arrived with a row left out arrives with the next
+        for name, _, _ in _ARRIVALS if in_order else ():  # what arrived with a row left out arrives with the next
             so_far = np.concatenate(([0], np.cumsum(rows[name])))[keep + 1]
             moved[name] = np.diff(so_far, prepend=0) > 0
         rows = moved
@@ -138,6 +147,7 @@ def judged(log: RecordedLog, source: Source) -> RecordedLog:
     """
     rows, repairs = log.rows.copy(), list(log.repairs)
     _fill_intervals(rows, source, repairs)
+    _check_arrivals(rows, repairs)
     _check_force(rows, source, repairs)
     factor = rate_factor(rows, log.reference)
     if factor != 1.0:
@@ -165,15 +175,26 @@ def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> N
     lost = np.round(steps / said) - 1.0
     short = (steps > 1.5 * said) & (steps <= LONGEST_GAP_S)
     if short.any():
-        k = int(np.flatnonzero(short)[0])
-        repairs.append(
-            f"{lost[short].sum():.0f} samples lost, the next stands for them; first at {rows['t_s'][k]:.2f} s"
-        )
+        repairs.append(f"{lost[short].sum():.0f} samples lost, the next stands for them; first {_at(rows, short)}")
     long = np.flatnonzero(steps > LONGEST_GAP_S)
     if len(long):
         k = int(long[np.argmax(steps[long])])
         repairs.append(f"{len(long)} gaps longer than {LONGEST_GAP_S} s, the longest {steps[k]:.1f} s "
                        f"until {rows['t_s'][k]:.2f} s")  # fmt: skip
+
+
+def _check_arrivals(rows: NDArray[Any], repairs: list[str]) -> None:
+    """What arrived without a number in it did not arrive."""
+    for new, what, columns in _ARRIVALS:
+        broken = rows[new] > 0
+        broken &= ~np.all([np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns], axis=0)
+        if broken.any():
+            repairs.append(f"{broken.sum()} {what} without a number left out, first {_at(rows, broken)}")
+            rows[new][broken] = 0
+
+
+def _at(rows: NDArray[Any], where: NDArray[np.bool_]) -> str:
+    return f"at {rows['t_s'][np.argmax(where)]:.2f} s"
 
 
 def _check_force(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:

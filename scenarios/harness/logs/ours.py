@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness.logs import checks
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from sim import recording
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
@@ -33,4 +32,4 @@ def read(path: Path) -> RecordedLog:
         float(setting(flight.manifest, "launch_longitude_deg", LONGITUDE_DEG)),
     )
     name = path.name if path.is_dir() else path.parent.name
-    return checks.mended(RecordedLog(rows, name or path.name, instruments, reference, (), place), path)
+    return RecordedLog(rows, name or path.name, instruments, reference, (), place)

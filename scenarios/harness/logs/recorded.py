@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from estimator.interface import Array
@@ -23,6 +24,11 @@ class Reference:
     R_eb: Array
     kind: Literal["truth", "filter", "firmware"]
     name: str
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Rows that have an attitude, shape (N,)."""
+        return np.asarray(np.isfinite(self.R_eb).all(axis=(1, 2)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,14 +88,13 @@ def attitude(table: Table) -> Array | None:
         known = np.abs(R_eb @ R_eb.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < 0.1
     elif all(name in table for name in QUATERNION):
         quaternion = _stack(table, QUATERNION)
-        known = np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) < 0.1
+        known = np.asarray(np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) < 0.1)
         R_eb = np.full((len(known), 3, 3), np.nan)
         if known.any():
             R_eb[known] = Rotation.from_quat(quaternion[known]).as_matrix()
     elif all(name in table for name in EULER):
         angles = _stack(table, EULER)
-        known = np.isfinite(angles).all(axis=1)
-        known &= np.maximum.accumulate(np.any(angles != 0.0, axis=1))
+        known = np.isfinite(angles).all(axis=1) & np.maximum.accumulate(np.any(angles != 0.0, axis=1))
         R_eb = from_euler(*angles.T)
     else:
         return None
@@ -145,7 +144,7 @@ def _take_gps(rows: NDArray[np.void], table: Table, repairs: list[str]) -> tuple
 
 def _arrivals(table: Table, velocity: Array) -> NDArray[np.bool_]:
     """Rows in which a fix arrived: as a column says, else where the values are others than in the row before."""
-    good = np.isfinite(velocity).all(axis=1)
+    good = np.asarray(np.isfinite(velocity).all(axis=1))
     if "gps.fix" in table:
         good &= table["gps.fix"] >= LEAST_FIX
     if "gps.new" in table:
