@@ -66,6 +66,8 @@ def run(
 ) -> Told:
     """Read the log at `path`, replay it with each estimator of `names`, record each below the folder `into`.
 
+    params : of all of them, or, as ``premerlani.gps_latency_s``, of one
+
     Raises
     ------
     ValueError      one line: log, reference, map, estimator, parameter or folder; nothing has been written then
@@ -73,15 +75,16 @@ def run(
     window, params = window or Window(), params or {}
     if len({name.rpartition(":")[2] for name in names}) < len(names):
         raise ValueError(f"--estimator {','.join(names)}: name each one once")
+    of_each = {name: _params_of(name, names, params) for name in names}
     for name in names:
-        make(name, params)
+        make(name, of_each[name])
     recording.check_writable(into)
     log = logs.read(path, reference=reference, columns=columns)
     console.warn_if_cold()
     replays, folders = [], {}
     for name in names:
         with console.progress(f"replaying {name}", "") as advance:
-            replays.append(replay(log, name, params, window, advance))
+            replays.append(replay(log, name, of_each[name], window, advance))
     stem = log.name.partition(".")[0]
     for replayed in replays:
         flight = as_flight(log, replayed, window)
@@ -92,6 +95,19 @@ def run(
                 viewing.write_rerun(flight, folder)
     judged = judged_rows(log, window, replays[0].first)
     return Told(log, float(np.sum(log.rows["dt_s"][judged])), tuple(replays), folders)
+
+
+def _params_of(name: str, names: Sequence[str], params: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters for the estimator `name`: those for all, and those whose names begin with its own."""
+    shorts, short = [other.rpartition(":")[2] for other in names], name.rpartition(":")[2]
+    found = {}
+    for key, value in params.items():
+        head, _, rest = key.partition(".")
+        if head not in shorts or not rest:
+            found[key] = value
+        elif head == short:
+            found[rest] = value
+    return found
 
 
 def tell(told: Told) -> None:

@@ -24,6 +24,7 @@ from scenarios.harness.logs.witnesses import witnesses
 
 LATEST_S = 1.0  # a row later than this is not late: the clock was set, or two logs are in one file
 FASTEST_HZ = 20_000.0
+BUSIEST_RAD_S = 3.0  # no aeroplane turns faster for half of a log
 FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
 _DEGREES = 180.0 / np.pi
@@ -217,19 +218,17 @@ def _check_force(rows: NDArray[Any], source: Source, repairs: list[str]) -> None
 def rate_factor(rows: NDArray[Any], reference: Reference | None) -> float:
     """Factor to rad/s: 1, or that between degrees and radians where the gyro is off by just that.
 
-    Two kinds of evidence, neither of which a flight in the right unit can give.
-
-    *Range.*  One reading in a hundred beyond 2100 degrees a second, in rad/s: no part in use reaches that.
+    Two kinds of evidence, neither of which the log of an aeroplane in the right unit can give.
 
     *Witnesses.*  What else in the log turns (`witnesses.witnesses`: the reference, the magnetic field, the course,
     the direction of the specific force) is correlated with what the gyro says (above 0.7), and the gyro says 25 to
     130 times as much, around the 57.3 between the two units.  A correlation needs turning, so an aeroplane at rest
     says nothing; and a gyro in the right unit would have to overstate every turn 25 times, in step with it.  The
     first witness that speaks decides.
+
+    *Range*, where none speaks.  One reading in a hundred beyond 2100 degrees a second, which no part in use reaches,
+    or half of them beyond 3 rad/s: no aeroplane turns once round in two seconds for half of a log.
     """
-    rates = np.linalg.norm(rows["gyro_b_rad_s"], axis=1)
-    if np.percentile(rates, 99.0) > GYRO_RANGE_RAD_S:
-        return 1.0 / _DEGREES
     for seen, said in witnesses(rows, reference):
         together = float(np.sum(seen * said))
         squared = float(np.sum(seen**2)) * float(np.sum(said**2))
@@ -239,7 +238,9 @@ def rate_factor(rows: NDArray[Any], reference: Reference | None) -> float:
         if 25.0 < ratio < 130.0:
             return 1.0 / _DEGREES
         return _DEGREES if 25.0 < 1.0 / ratio < 130.0 else 1.0
-    return 1.0
+    rates = np.linalg.norm(rows["gyro_b_rad_s"], axis=1)
+    beyond = np.percentile(rates, 99.0) > GYRO_RANGE_RAD_S or np.median(rates) > BUSIEST_RAD_S
+    return 1.0 / _DEGREES if beyond else 1.0
 
 
 def _note_field(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:

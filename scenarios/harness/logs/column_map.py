@@ -57,9 +57,11 @@ def _vector(name: str, dimension: str, *patterns: str) -> dict[str, Quantity]:
 
 QUANTITIES: dict[str, Quantity] = {
     "time": Quantity("time", ("t", "time", "timestamp")),
-    **_vector("gyro", "rate", "gyro_@", "gyro_b_@", "gyr_@", "g@", "w@", "omega_@", "angular_velocity_@"),
-    **_vector("force", "force", "force_@", "force_b_@", "accel_@", "acc_@", "a@", "f@", "linear_acceleration_@"),
-    **_vector("mag", "field", "mag_@", "mag_b_@", "m@", "h@", "magnetic_field_@"),
+    **_vector("gyro", "rate", "gyro_@", "gyro_b_@", "gyr_@", "gyr@", "g@", "w@", "omega_@", "angular_velocity_@"),
+    **_vector(
+        "force", "force", "force_@", "force_b_@", "accel_@", "acc_@", "acc@", "a@", "f@", "linear_acceleration_@"
+    ),
+    **_vector("mag", "field", "mag_@", "mag_b_@", "mag@", "m@", "h@", "magnetic_field_@"),
     "gps.new": Quantity("number", ("gps_new",)),
     "gps.fix": Quantity("number", ("gps_fix", "fix_type")),
     "gps.latitude": Quantity("angle", ("latitude", "lat", "gps_lat", "gps_latitude")),

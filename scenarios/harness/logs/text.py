@@ -55,7 +55,7 @@ def _table(path: Path, how: ColumnMap) -> tuple[dict[str, Array], list[int], str
     if twice:
         raise LogError(f"{path}: line {at[0]}: two columns are named {twice[0]!r}")
     cut = ""
-    if len(rows[-1]) < len(header) or (len(rows) > 1 and _bad_cell(rows[-1]) is not None):
+    if len(rows[-1]) < len(header) or (len(rows) > 1 and _cut_cell(rows[-1], rows[-2])):
         cut = f"line {at[-1] + 1}, the last, was cut off: left out"
         rows, at = rows[:-1], at[:-1]
     for i, row in zip(at, rows, strict=True):
@@ -79,19 +79,23 @@ def _numeric(path: Path, how: ColumnMap, header: list[str], rows: list[list[str]
             columns[name] = np.array([float(row[j]) if row[j] else np.nan for row in rows])
         except ValueError as error:
             if name in wanted:
-                i, cell = next((i, row[j]) for i, row in zip(at, rows, strict=True) if _bad_cell([row[j]]) is not None)
+                i, cell = next((i, row[j]) for i, row in zip(at, rows, strict=True) if not _is_number(row[j]))
                 raise LogError(f"{path}: line {i + 1}, column {name}: {cell!r} is no number") from error
     return columns
 
 
-def _bad_cell(row: list[str]) -> int | None:
-    """Index of the first cell that is neither empty nor a number."""
-    for j, cell in enumerate(row):
-        try:
-            float(cell or "nan")
-        except ValueError:
-            return j
-    return None
+def _is_number(cell: str) -> bool:
+    """Whether the cell holds a number, or nothing."""
+    try:
+        float(cell or "nan")
+    except ValueError:
+        return False
+    return True
+
+
+def _cut_cell(row: list[str], before: list[str]) -> bool:
+    """Whether the last cell of `row` is the beginning of a number, as in "-" or "1e", below a whole one."""
+    return not _is_number(row[-1]) and _is_number(before[-1])
 
 
 def _text(path: Path) -> str:
