@@ -115,6 +115,14 @@ def make(spec: str, params: Mapping[str, Any]) -> AttitudeEstimator:
     return type(estimator)(changed(before, values, f"estimator {spec}"))  # type: ignore[call-arg]
 
 
+def suited(spec: str, suits: Mapping[str, float]) -> dict[str, float]:
+    """Those of a log's `suits` that the estimator `spec` has parameters for."""
+    if not suits:
+        return {}
+    params = getattr(load_estimator(spec), "params", None)
+    return {name: value for name, value in suits.items() if hasattr(params, name)}
+
+
 def replay(
     log: RecordedLog,
     spec: str,
@@ -124,12 +132,14 @@ def replay(
 ) -> Replayed:
     """Run the estimator `spec` over `log` and score it.
 
+    params : by name; what the log says of its instruments (`RecordedLog.suits`) holds where they do not
+
     Raises
     ------
     ValueError      one line: no such estimator or parameter, or a calibration longer than the log
     """
     window = window or Window()
-    estimator = make(spec, params or {})
+    estimator = make(spec, {**suited(spec, log.suits), **(params or {})})
     n = _calibration(log, window)
     on_ground = at_rest(log.rows[:n]) if n else None
     first = n if on_ground is not None else 0

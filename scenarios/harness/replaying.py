@@ -46,6 +46,7 @@ class Told:
             "reference": self.log.reference.name if self.log.reference else None,
             "reference_kind": self.log.reference.kind if self.log.reference else None,
             "repairs": list(self.log.repairs),
+            "suits": dict(self.log.suits),
             "judged_s": self.judged_s,
         }
         each = {r.estimator: r.to_json() | {"recording": str(self.folders[r.estimator])} for r in self.replays}
@@ -117,6 +118,9 @@ def tell(told: Told) -> None:
     out.print(Text(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}"), soft_wrap=True)
     for line in log.repairs:
         out.print(Text(f"repaired    {line}", "yellow"), soft_wrap=True)
+    if log.suits:
+        suits = ", ".join(f"{name}={value:g}" for name, value in log.suits.items())
+        out.print(Text(f"set to suit {suits} (where an estimator has it, and --set does not say)"), soft_wrap=True)
     if log.reference is None:
         out.print(Text("no attitude in it to score against: --reference FILE"), soft_wrap=True)
     else:

@@ -36,6 +36,7 @@ def test_load_reads_sign_quantity_and_unit(tmp_path):
         ('[columns]\na = "gyro.w"', "a = 'gyro.w': unknown quantity 'gyro.w': did you mean"),
         ('[columns]\na = "gyro.x uT"', "unit 'uT' of gyro.x must be one of rad/s, deg/s"),
         ('[columns]\na = "gyro.x"\nb = "gyro.x"', "gyro.x is the meaning of two columns"),
+        ('[columns]\n[suits]\na = "b"', r"\[suits\] must hold numbers"),
         ('delimiter = ",,"\n[columns]', "delimiter must be one character"),
     ],
 )

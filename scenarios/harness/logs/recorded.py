@@ -1,6 +1,7 @@
 """What every reader of logs returns: measured rows, and the reference attitude that the log holds."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -39,6 +40,7 @@ class RecordedLog:
     name : of the file            instruments : those that the log has
     reference : or None           repairs : what was repaired and how often, a line each
     place : latitude and longitude of the origin of positions, degrees, where known
+    suits : what is known of the instruments aboard, as parameters of estimators, ``{"gps_latency_s": 0.2}``
     """
 
     rows: NDArray[Any]
@@ -47,3 +49,4 @@ class RecordedLog:
     reference: Reference | None = None
     repairs: tuple[str, ...] = ()
     place: tuple[float, float] | None = None
+    suits: Mapping[str, float] = field(default_factory=dict)
