@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | bench | aircraft | sensors | export | view``.
+"""The command line: ``wingslevel list | fly | check | replay | bench | aircraft | sensors | export | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -234,6 +234,52 @@ def check(
         if not whole:
             return INTERRUPTED
     return verdict.exit_code
+
+
+@app.command()
+def replay(
+    log: Annotated[Path, typer.Argument(help="Recording of ours, .csv, .mat, .bin, .ulg, or reference vectors.")],
+    estimator: Annotated[
+        str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
+    ] = "premerlani",
+    reference: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
+    ] = None,
+    columns: Annotated[
+        str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+    ] = None,
+    calibration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]"),
+    ] = None,
+    airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
+    settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,
+    out: Annotated[Path, typer.Option(help="Folder for the recordings.")] = FLIGHTS,
+    no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
+    json_: JsonOption = None,
+) -> int:
+    """Run estimators over a recorded log and score them against the attitude that it holds."""
+    from scenarios.harness import replaying
+    from scenarios.harness.replay import Window
+
+    with _reporting(json_) as report:
+        with usage():
+            told = replaying.run(
+                log,
+                [name.strip() for name in estimator.split(",") if name.strip()],
+                out,
+                reference=reference,
+                columns=columns,
+                params=_changes(set_),
+                window=Window(airborne, settle, calibration),
+                rerun=not no_rerun,
+            )
+        report(told.to_json())
+        replaying.tell(told)  # last: a reader who closes the pipe loses no file
+    return told.exit_code
 
 
 @app.command()
