@@ -22,7 +22,6 @@ from estimator.rotation import heading_error_rad, inclination_error_rad, rotatio
 from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
 from scenarios.harness import console
 from scenarios.harness.config import literal
-from scenarios.harness.fitted import changed
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
 from scenarios.harness.plugins import heading_reference_of, load_estimator
@@ -30,6 +29,7 @@ from sim.acceptance import FlightCodeFailed, estimate_of
 from sim.events import events_of
 from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.oracle import Oracle
+from sim.params import changed
 
 CALIBRATION_S = 2.0
 STILL_M_S, STILL_M_S2 = 2.0, 0.7  # faster over the ground, or shaken more than this (sigma), is not at rest
