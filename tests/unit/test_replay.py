@@ -169,7 +169,7 @@ def test_power_up_at_rest_takes_the_mean_and_in_the_air_nothing():
     rows["gyro_b_rad_s"] = [0.01, -0.02, 0.03]
     sample = at_rest(rows)
     np.testing.assert_allclose(sample.gyro_b_rad_s, [0.01, -0.02, 0.03], rtol=1e-12)
-    for column, value in (("gyro_b_rad_s", 0.5), ("force_b_m_s2", [0.0, 0.0, -13.0]), ("gps_speed_m_s", 9.0)):
+    for column, value in (("gyro_b_rad_s", 0.9), ("force_b_m_s2", [0.0, 0.0, -13.0]), ("gps_speed_m_s", 9.0)):
         moved = rows.copy()
         moved[column] = value
         assert at_rest(moved) is None
