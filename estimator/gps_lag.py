@@ -64,19 +64,20 @@ def filter_nose(s):  # type: ignore[no-untyped-def]
 def recall_nose(s):  # type: ignore[no-untyped-def]
     """Set ``s.nose_at_fix`` to the filtered nose of a latency ago, between two remembered ones, or the oldest."""
     t_s = s.clock_s - s.gps_latency_s if s.gps_lag_filter else s.clock_s
-    t1, x1, y1 = s.clock_s, s.nose[0], s.nose[1]
-    i = s.newest
-    for _ in range(HISTORY):
-        t0, x0, y0 = s.history_t_s[i], s.history[i, 0], s.history[i, 1]
-        if t0 > t1:  # came round to a newer one: the previous was the oldest
+    newer_t_s, x, y = s.clock_s, s.nose[0], s.nose[1]
+    i = later = s.newest
+    while s.history_t_s[i] > t_s:
+        older = i - 1 if i > 0 else HISTORY - 1
+        if s.history_t_s[older] >= s.history_t_s[i]:  # came round to a newer one: there is none older
+            t_s = s.history_t_s[i]
             break
-        if t0 <= t_s:
-            part = (t_s - t0) / (t1 - t0) if t1 > t0 else 1.0
-            x1, y1 = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
-            break
-        t1, x1, y1 = t0, x0, y0
-        i = i - 1 if i > 0 else HISTORY - 1
-    s.nose_at_fix[0], s.nose_at_fix[1] = x1, y1
+        later, i = i, older
+    if later != i:
+        newer_t_s, x, y = s.history_t_s[later], s.history[later, 0], s.history[later, 1]
+    gap_s = newer_t_s - s.history_t_s[i]
+    part = (t_s - s.history_t_s[i]) / gap_s if gap_s > 0.0 else 1.0
+    s.nose_at_fix[0] = s.history[i, 0] + part * (x - s.history[i, 0])
+    s.nose_at_fix[1] = s.history[i, 1] + part * (y - s.history[i, 1])
 
 
 @inlined

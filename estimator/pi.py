@@ -40,11 +40,13 @@ def feed_back(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_p_b, omega_i_b)
     offset_limit_rad_s : float       largest gyro offset that is believed, per axis
     omega_p_b, omega_i_b : shape (3,)  rate corrections, written
     """
-    squared = k_p * k_p * (total_b[0] * total_b[0] + total_b[1] * total_b[1] + total_b[2] * total_b[2])
-    seen = 1.0
-    if squared > offset_limit_rad_s * offset_limit_rad_s:
-        seen = offset_limit_rad_s / np.sqrt(squared)
     for i in range(3):
         omega_p_b[i] = k_p * total_b[i]
-        integral = omega_i_b[i] + k_i * dt_s * seen * total_b[i]
-        omega_i_b[i] = clip(integral, -offset_limit_rad_s, offset_limit_rad_s)
+    if k_i == 0.0:
+        return
+    step_s = k_i * dt_s
+    squared = k_p * k_p * (total_b[0] * total_b[0] + total_b[1] * total_b[1] + total_b[2] * total_b[2])
+    if squared > offset_limit_rad_s * offset_limit_rad_s:
+        step_s *= offset_limit_rad_s / np.sqrt(squared)
+    for i in range(3):
+        omega_i_b[i] = clip(omega_i_b[i] + step_s * total_b[i], -offset_limit_rad_s, offset_limit_rad_s)

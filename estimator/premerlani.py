@@ -226,6 +226,12 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
             s.rejected += 1
 
 
+@inlined
+def nose_length(s):  # type: ignore[no-untyped-def]
+    """Length of the horizontal nose that belongs to the last fix."""
+    return np.sqrt(s.nose_at_fix[0] * s.nose_at_fix[0] + s.nose_at_fix[1] * s.nose_at_fix[1])
+
+
 @kernel
 def believe_fix(course_rad, speed_m_s, s):  # type: ignore[no-untyped-def]
     """Set the reference (Eqn 22) and the speed of Eqn 25, and recall the nose that belongs to them."""
@@ -236,10 +242,10 @@ def believe_fix(course_rad, speed_m_s, s):  # type: ignore[no-untyped-def]
             learn_wind(s, s.nose_at_fix[0], s.nose_at_fix[1], north, east, s.fix_age_s)
         if s.wind_known:
             north, east = north - s.wind_e_m_s[0], east - s.wind_e_m_s[1]
-    speed = np.hypot(north, east)
+    speed = np.sqrt(north * north + east * east)
     s.speed_m_s = speed
     if s.gps_lag_filter:  # the filter that shortened the nose shortened the velocity alike
-        s.speed_m_s /= clip(np.hypot(s.nose_at_fix[0], s.nose_at_fix[1]), SHORTEST_NOSE, 1.0)
+        s.speed_m_s /= clip(nose_length(s), SHORTEST_NOSE, 1.0)
     if speed >= s.min_speed_m_s:
         s.fix_age_s = 0.0
         s.course[0], s.course[1] = north / speed, east / speed  # Eqn 22
