@@ -34,9 +34,10 @@ _HEALTH = tuple(Health)  # an index into a tuple costs a tenth of a call of the 
 
 @inlined
 def write_estimate(s, health, estimate):  # type: ignore[no-untyped-def]
-    """Copy the belief of the state record `s` into a record of ESTIMATE."""
+    """Copy the belief of the state record `s` into a record of ESTIMATE, all of it; no wind (see `write_wind`)."""
     estimate.health = health
     for i in range(3):
+        estimate.wind_e_m_s[i] = np.nan
         estimate.omega_b_rad_s[i] = s.omega_b_rad_s[i]
         estimate.gyro_bias_b_rad_s[i] = s.gyro_bias_b_rad_s[i]
         for j in range(3):
@@ -89,8 +90,7 @@ class Compiled:
         -------
         shape (N,), ESTIMATE_DTYPE: R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health
         """
-        estimates = np.zeros(len(rows), ESTIMATE_DTYPE)
-        estimates["wind_e_m_s"] = np.nan
+        estimates = np.empty(len(rows), ESTIMATE_DTYPE)
         self._replay(rows, self._state, estimates)
         return estimates
 

@@ -72,7 +72,7 @@ from estimator.gps_lag import (
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import inlined, kernel
 from estimator.kernels import clip
-from estimator.pi import feed_back, weigh
+from estimator.pi import correct, learn_offset, weigh
 from estimator.rotation import integrate
 from estimator.screening import (
     FORCE_GOOD,
@@ -180,6 +180,7 @@ _STATE = (
     Column("roll_pitch_b", (3,), "roll-pitch correction, Eqn 27"),
     Column("yaw_b", (3,), "yaw correction, Eqn 24"),
     Column("total_b", (3,), "weighted sum, Eqn 28"),
+    Column("learning", (), "1 where the integral takes the total of this sample", integer=True),
     Column("g_ref_b_m_s2", (3,), "reference of gravity, Eqn 26"),
     Column("largest_b_m_s2", (3,), "largest reading of each accelerometer axis"),
     Column("may_clip", (), "1 where the end of the scale is known or looked for", integer=True),
@@ -357,6 +358,8 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     good = screen(row, s)
     if good:
         corrected_rate(row, s, good)
+        if s.learning:  # from the sample before: the processor need not wait for it, and it changes slowly
+            learn_offset(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_i_b)
         if not integrate(s.R_eb, s.omega_total_b, s.dt_s):  # Eqns 17-21
             s.locked = 0
         filter_nose(s)
@@ -368,10 +371,9 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         else:
             s.roll_pitch_b[0] = s.roll_pitch_b[1] = s.roll_pitch_b[2] = 0.0
         weigh(s.w_rp, s.roll_pitch_b, w_y, s.yaw_b, s.total_b)
+        correct(s.total_b, s.k_p, s.omega_p_b)
         w = s.omega_b_rad_s
-        turning = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] >= s.integrate_below_rad_s * s.integrate_below_rad_s
-        k_i = 0.0 if turning else s.k_i
-        feed_back(s.total_b, s.k_p, k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
+        s.learning = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < s.integrate_below_rad_s * s.integrate_below_rad_s
     if s.rejected != before:
         return 2  # Health.POOR
     if not s.locked:
