@@ -67,14 +67,14 @@ class Compiled:
         self._R_eb = self._state["R_eb"][0]
         self._omega_b_rad_s = self._state["omega_b_rad_s"][0]
         self._gyro_bias_b_rad_s = self._state["gyro_bias_b_rad_s"][0]
-        self._estimates_wind = "wind_known" in (state_dtype.names or ())
+        estimates_wind = "wind_known" in (state_dtype.names or ())
+        self._wind_known = self._state["wind_known"] if estimates_wind else np.zeros(1, np.int64)
+        self._wind_e_m_s = self._state["wind_e_m_s"][0] if estimates_wind else np.zeros(3)
 
     def update(self, m: Measurements) -> AttitudeEstimate:
         """Take one tick's measurements, return the attitude at its end; the arrays are the caller's to keep."""
         health = self._step(m.rows, m.k, self._state)
-        wind_e_m_s = None
-        if self._estimates_wind and self._state["wind_known"][0]:
-            wind_e_m_s = self._state["wind_e_m_s"][0].copy()
+        wind_e_m_s = self._wind_e_m_s.copy() if self._wind_known[0] else None
         return AttitudeEstimate(
             self._R_eb.copy(), self._omega_b_rad_s.copy(), self._gyro_bias_b_rad_s.copy(), wind_e_m_s, _HEALTH[health]
         )
