@@ -43,6 +43,9 @@ from typing import TypeVar
 
 ESTIMATORS: dict[str, str] = {
     "premerlani": "estimator.premerlani:Premerlani",
+    "gps_velocity": "estimator.gps_velocity:GpsVelocity",
+    "gps_velocity_nose": "estimator.gps_velocity:GpsVelocityNose",
+    "gps_velocity_magnetometer": "estimator.gps_velocity:GpsVelocityMagnetometer",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
 }

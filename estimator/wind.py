@@ -19,8 +19,6 @@ References
 W. Premerlani, "IMU wind estimation (theory)", 2009 (the two-fix form).
 """
 
-import numpy as np
-
 from estimator.compiled import WIND
 from estimator.interface import Column
 from estimator.jit import kernel

@@ -1,0 +1,551 @@
+"""Roll-pitch drift from the change of GPS velocity: Premerlani's note of 2011, with a yaw reference of one's choice.
+
+An accelerometer feels gravity minus acceleration (Eqn 1), and the attitude carries that into the earth frame
+(Eqn 2).  Integrated between two GPS reports it must be what gravity and the change of the reported velocity leave
+(Eqn 3); the cross product of the two sides is the error of the attitude (Eqns 4 and 5).  No airspeed, no angle of
+attack and no sideslip is assumed, so the method holds in turns, in wind and in loops, where the centrifugal
+term of the first paper does not.
+
+Two frames
+----------
+``g`` is the earth as the gyros alone have it: ``R_gb`` integrates the corrected rate and nothing else.  All
+proportional corrections go into ``R_eg``, and the attitude is ``R_eb = R_eg @ R_gb`` (Eqns 16 and 17, with the
+proportional term of Eqn 29 applied from the earth's side).  What is summed, filtered and remembered lives in ``g``,
+so that every correction turns the whole memory with it: lag in the reports is then no lag in the feedback loop.
+
+Lag
+---
+A receiver reports velocity filtered and late.  The left side of Eqn 3 and the nose pass the same filter and are
+recalled from one latency ago.  An error that is left at a report is removed evenly until the next one, by
+1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
+
+Before the yaw is locked
+------------------------
+With an unknown heading an acceleration along the ground is taken for a tilt: in a launch by 11 degrees.  Until the
+nose has come near the reference, and where no reports come, the paper of 2009 stands in (Eqns 25 to 27): the
+acceleration is the speed times the turning of the nose.  Summed up, that is Eqn 3 with the velocity along the nose.
+And nothing is corrected while the length of what is then taken for gravity is not gravity's.
+
+Yaw
+---
+``course``: the nose is turned to the course over ground (Eqns 22 to 24), lag-matched.  ``nose``: to the velocity
+through the air, the wind being learnt in turns (`estimator.wind`); until then that is the course.
+``magnetometer``: to magnetic north.  A heading that is locked to the course is off by the crab angle, and Eqn 4 would
+turn that into a tilt in turns: once the wind is known, the left side is compared along the true heading.
+
+References
+----------
+W. Premerlani, "Roll-Pitch Gyro Drift Compensation", 2011.
+W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.jit import kernel
+from estimator.pi import feed_back
+from estimator.rotation import integrate, level, renormalise
+from estimator.screening import (
+    COAST_S,
+    FORCE_GOOD,
+    FORCE_RANGE_M_S2,
+    G_M_S2,
+    GYRO_RANGE_RAD_S,
+    LONGEST_GAP_S,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    screen,
+    take_rate,
+)
+from estimator.wind import WIND_FILTER, learn_wind
+
+HISTORY, SPACING_S = 640, 0.0199  # remembered instants and their least distance: 12.7 s at any sample rate
+LONGEST_LATENCY_S = 12.5
+FIX_LIFE_S = 2.5  # reports further apart are compared no more
+LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown
+STAND_IN_S = 0.1  # how often the paper's correction is worked out where it stands in
+LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this close for this long
+COURSE, NOSE, MAGNETOMETER = 0, 1, 2
+YAW_REFERENCES = ("course", "nose", "magnetometer")
+
+YawReference = Literal["course", "nose", "magnetometer"]
+
+
+@dataclass(frozen=True, slots=True)
+class GpsVelocityParams:
+    """Gains and options.
+
+    yaw_reference : str        what the heading converges to: "course", "nose" or "magnetometer"
+    w_rp, w_y : float          weights of the roll-pitch and the yaw error (Eqn 28 of the paper).  Large: errors go
+                               quickly, noise of the reports gets in
+    w_start : float            weight of the paper's roll-pitch correction while it stands in
+    k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
+    offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
+    integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
+    gps_filter_s : float       time constant of the receiver's velocity filter
+    gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
+    launch_gate : float        the stand-in corrects nothing while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
+    min_speed_m_s : float      slowest speed at which a velocity tells a heading
+    declination_rad : float    of magnetic from true north, positive east; for the magnetometer
+    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
+    """
+
+    yaw_reference: YawReference = "course"
+    w_rp: float = 0.5
+    w_y: float = 1.0
+    w_start: float = 0.3
+    k_p: float = 1.0
+    k_i: float = 0.03
+    offset_limit_rad_s: float = math.radians(6.0)
+    integrate_below_rad_s: float = math.radians(60.0)
+    gps_filter_s: float = 1.0
+    gps_latency_s: float = 0.3
+    launch_gate: float = 0.2
+    min_speed_m_s: float = 3.0
+    declination_rad: float = 0.0
+    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
+    force_range_m_s2: float = FORCE_RANGE_M_S2
+
+    def __post_init__(self) -> None:
+        if self.yaw_reference not in YAW_REFERENCES:
+            raise ValueError(f"yaw_reference is {self.yaw_reference!r}; it must be one of {', '.join(YAW_REFERENCES)}")
+        positive = (
+            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2",
+        )  # fmt: skip
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.name == "yaw_reference":
+                continue
+            if f.name == "declination_rad":
+                if not abs(value) <= math.pi:
+                    raise ValueError(f"declination_rad is {value} rad; it must be -pi to pi")
+            elif f.name in positive:
+                if not value > 0.0:
+                    raise ValueError(f"{f.name} is {value}; it must be more than zero")
+            elif not 0.0 <= value < math.inf:
+                raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
+        for name in ("gyro_range_rad_s", "force_range_m_s2"):
+            if getattr(self, name) > 1e4:
+                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
+        if self.gps_latency_s > LONGEST_LATENCY_S:
+            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
+
+
+_PARAMS = tuple(
+    Column(f.name, (), "see GpsVelocityParams", integer=f.name == "yaw_reference")
+    for f in fields(GpsVelocityParams)
+    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
+)
+_STATE = (
+    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
+    Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
+    Column("R_gb", (3, 3), "attitude as the gyros alone have it"),
+    Column("R_eg", (3, 3), "product of all corrections"),
+    Column("yaw_applied_rad", (), "part of them about the vertical"),
+    Column("tilt_rate_e", (3,), "rate of the roll-pitch correction under way"),
+    Column("tilt_left_s", (), "for how long still"),
+    Column("yaw_rate_e", (3,), "rate of the yaw correction under way"),
+    Column("yaw_left_s", (), "for how long still"),
+    Column("felt_g_m_s", (3,), "integral of what the accelerometer feels, left side of Eqn 3"),
+    Column("force_g_m_s2", (3,), "the last of its summands"),
+    Column("late_g", (6,), "that integral and the nose, through the receiver's filter"),
+    Column("weights_dt_s", (), "sample interval to which the next two belong"),
+    Column("before", (), "filter: weight of its last output"),
+    Column("end", (), "filter: weight of the input at the end of the interval"),
+    Column("history_t_s", (HISTORY,), "when each remembered `late_g` was"),
+    Column("history", (HISTORY, 6), "remembered `late_g`"),
+    Column("newest", (), "index of the newest of them", integer=True),
+    Column("at_fix_g", (6,), "`late_g` of the last fix"),
+    Column("since_fix_g_m_s", (3,), "left side of Eqn 3 over the last interval"),
+    Column("fix_t_s", (), "when the last fix was true, by the clock of the state"),
+    Column("interval_s", (), "from the fix before it"),
+    Column("v_e_m_s", (3,), "velocity of the last fix"),
+    Column("fix_age_s", (), "time since a fix arrived"),
+    Column("mag_t_s", (), "when the magnetometer spoke last"),
+    Column("blind_until_s", (), "until then the sums have a hole in them"),
+    Column("unfelt_s", (), "how long the accelerometer has been broken"),
+    Column("stand_in_t_s", (), "start of the interval of the stand-in"),
+    Column("stand_in_g", (6,), "felt integral and nose then"),
+    Column("error_e", (3,), "the error being worked on, earth axes, Eqn 4"),
+    Column("total_b", (3,), "weighted error, Eqn 28"),
+    Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
+    Column("near_s", (), "how long the yaw error has been small"),
+    Column("locked", (), "1 once yaw was found", integer=True),
+)
+STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + _PARAMS + _STATE)
+
+
+@kernel
+def turn_earth(R, omega_e, dt_s):  # type: ignore[no-untyped-def]
+    """Rotate `R` from the earth's side, in place and renormalised: each column c becomes c + omega x c dt."""
+    x, y, z = omega_e[0] * dt_s, omega_e[1] * dt_s, omega_e[2] * dt_s
+    for j in range(3):
+        a, b, c = R[0, j], R[1, j], R[2, j]
+        R[0, j] = a + y * c - z * b
+        R[1, j] = b + z * a - x * c
+        R[2, j] = c + x * b - y * a
+    if not renormalise(R):
+        level(R)
+
+
+@kernel
+def attitude(s):  # type: ignore[no-untyped-def]
+    """Apply what is under way of the corrections, and set ``R_eb = R_eg @ R_gb``."""
+    if s.tilt_left_s > 0.0 or s.yaw_left_s > 0.0:
+        tilt_s, yaw_s = min(s.tilt_left_s, s.dt_s), min(s.yaw_left_s, s.dt_s)
+        s.tilt_left_s -= tilt_s
+        s.yaw_left_s -= yaw_s
+        x, y = s.tilt_rate_e[0] * tilt_s, s.tilt_rate_e[1] * tilt_s
+        z = s.tilt_rate_e[2] * tilt_s + s.yaw_rate_e[2] * yaw_s
+        s.yaw_applied_rad += z
+        turn_earth(s.R_eg, (x, y, z), 1.0)
+    for i in range(3):
+        a, b, c = s.R_eg[i, 0], s.R_eg[i, 1], s.R_eg[i, 2]
+        for j in range(3):
+            s.R_eb[i, j] = a * s.R_gb[0, j] + b * s.R_gb[1, j] + c * s.R_gb[2, j]
+
+
+@kernel
+def filter_weights(s):  # type: ignore[no-untyped-def]
+    """Weights of the receiver's filter for an input that is linear within the interval: its exact solution."""
+    s.weights_dt_s = s.dt_s
+    if s.gps_filter_s > 0.0:
+        part = s.dt_s / s.gps_filter_s
+        s.before = np.exp(-part)
+        s.end = 1.0 - (1.0 - s.before) / part
+    else:
+        s.before, s.end = 0.0, 1.0
+
+
+@kernel
+def sum_up(row, s, good):  # type: ignore[no-untyped-def]
+    """Integrate the gyros (Eqn 17) and the left side of Eqn 3, pass both through the receiver's filter, remember."""
+    R, w, h = s.R_gb, s.omega_b_rad_s, 0.5 * s.dt_s
+    nose0, nose1, nose2 = R[0, 0], R[1, 0], R[2, 0]
+    if not integrate(R, w, s.dt_s):
+        level(s.R_eg)
+        s.locked = 0
+    if good & FORCE_GOOD:
+        # Eqn 1: the note's accelerometer is gravity minus acceleration, -f.  It is a mean over the interval: half an
+        # interval earlier the body had not turned as far, A - (omega x A) dt / 2.
+        x, y, z = -row.force_b_m_s2[0], -row.force_b_m_s2[1], -row.force_b_m_s2[2]
+        a, b, c = x - h * (w[1] * z - w[2] * y), y - h * (w[2] * x - w[0] * z), z - h * (w[0] * y - w[1] * x)
+        for i in range(3):
+            s.force_g_m_s2[i] = R[i, 0] * a + R[i, 1] * b + R[i, 2] * c  # Eqn 2
+        s.unfelt_s = 0.0
+    else:
+        s.unfelt_s += s.dt_s
+        if s.unfelt_s > COAST_S:
+            s.blind_until_s = s.clock_s + s.gps_latency_s + 3.0 * s.gps_filter_s
+    if s.weights_dt_s != s.dt_s:
+        filter_weights(s)
+    before, end = s.before, s.end
+    start = 1.0 - before - end
+    for i in range(3):
+        felt = s.felt_g_m_s[i]
+        s.felt_g_m_s[i] = felt + s.force_g_m_s2[i] * s.dt_s  # Eqn 3
+        s.late_g[i] = before * s.late_g[i] + start * felt + end * s.felt_g_m_s[i]
+    s.late_g[3] = before * s.late_g[3] + start * nose0 + end * R[0, 0]
+    s.late_g[4] = before * s.late_g[4] + start * nose1 + end * R[1, 0]
+    s.late_g[5] = before * s.late_g[5] + start * nose2 + end * R[2, 0]
+    if s.clock_s - s.history_t_s[s.newest] >= SPACING_S:
+        s.newest = (s.newest + 1) % HISTORY
+        s.history_t_s[s.newest] = s.clock_s
+        for i in range(6):
+            s.history[s.newest, i] = s.late_g[i]
+
+
+@kernel
+def recall(s, t_s):  # type: ignore[no-untyped-def]
+    """Set ``s.at_fix_g`` to `late_g` at `t_s`, between two remembered instants, or the oldest there is."""
+    newer, part, t1 = -1, 0.0, s.clock_s  # -1: the present
+    i = s.newest
+    for back in range(HISTORY):
+        i = (s.newest - back) % HISTORY
+        t0 = s.history_t_s[i]
+        if t0 > t1:  # came round to a newer one: the previous was the oldest
+            i, part = newer, 0.0
+            break
+        if t0 <= t_s:
+            part = (t_s - t0) / (t1 - t0) if t1 > t0 else 0.0
+            break
+        newer, t1 = i, t0
+    for j in range(6):
+        older_value = s.history[i, j]
+        newer_value = s.history[newer, j] if newer >= 0 else s.late_g[j]
+        s.at_fix_g[j] = older_value + part * (newer_value - older_value)
+
+
+@kernel
+def correct(s, error_e, weight, interval_s, rate_e):  # type: ignore[no-untyped-def]
+    """Give an error to the PI controller (Eqns 5, 28 and 29) and set `rate_e`, which removes it within the interval."""
+    for i in range(3):
+        along = s.R_eb[0, i] * error_e[0] + s.R_eb[1, i] * error_e[1] + s.R_eb[2, i] * error_e[2]  # Eqn 5
+        s.total_b[i] = weight * along
+    w = s.omega_b_rad_s
+    turning = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) >= s.integrate_below_rad_s
+    decay = s.k_p * weight * interval_s
+    k_p = s.k_p * (-np.expm1(-decay) / decay if decay > 0.0 else 1.0)
+    k_i = 0.0 if turning else s.k_i
+    feed_back(s.total_b, k_p, k_i, s.offset_limit_rad_s, interval_s, s.omega_p_b, s.omega_i_b)
+    for i in range(3):
+        rate_e[i] = k_p * weight * error_e[i]
+
+
+@kernel
+def correct_tilt(s, error_e, weight, interval_s):  # type: ignore[no-untyped-def]
+    """Roll-pitch error, earth axes, to be removed within `interval_s`."""
+    correct(s, error_e, weight, interval_s, s.tilt_rate_e)
+    s.tilt_left_s = interval_s
+
+
+@kernel
+def correct_yaw(s, sine, cosine, length, interval_s):  # type: ignore[no-untyped-def]
+    """Yaw error: `sine` and `cosine` of the angle still to turn, both times `length`, which weighs it.
+
+    The cross product of Eqn 23 fades beyond a right angle: there its sign is kept, at full strength.
+    """
+    near = cosine > 0.0 and abs(sine) < np.tan(LOCK_RAD) * cosine
+    s.near_s = s.near_s + interval_s if near else 0.0
+    if s.near_s >= LOCK_S:
+        s.locked = 1
+    ground = sine if cosine >= 0.0 else np.copysign(length, sine)  # Eqn 23
+    s.error_e[0] = s.error_e[1] = 0.0
+    s.error_e[2] = ground  # Eqn 24: along the vertical
+    correct(s, s.error_e, s.w_y, interval_s, s.yaw_rate_e)
+    s.yaw_left_s = interval_s
+
+
+@kernel
+def to_earth(s, v_g):  # type: ignore[no-untyped-def]
+    """`v_g` of shape (3,) with all corrections up to now, as a tuple."""
+    R = s.R_eg
+    return (
+        R[0, 0] * v_g[0] + R[0, 1] * v_g[1] + R[0, 2] * v_g[2],
+        R[1, 0] * v_g[0] + R[1, 1] * v_g[1] + R[1, 2] * v_g[2],
+        R[2, 0] * v_g[0] + R[2, 1] * v_g[1] + R[2, 2] * v_g[2],
+    )
+
+
+@kernel
+def crab_rad(s):  # type: ignore[no-untyped-def]
+    """Angle from the heading of the matrix to that of the nose; zero where they are the same or nobody knows."""
+    if s.yaw_reference != COURSE or not s.wind_known:
+        return 0.0
+    return np.arctan2(s.air_m_s[1], s.air_m_s[0]) - s.yaw_applied_rad
+
+
+@kernel
+def roll_pitch_at_fix(s, dv_e_m_s):  # type: ignore[no-untyped-def]
+    """Eqns 3 and 4 over the interval between two fixes, `dv_e_m_s` the change of the reported velocity."""
+    x, y, left2 = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
+    crab = crab_rad(s)
+    c, z = np.cos(crab), np.sin(crab)
+    left0, left1 = c * x - z * y, z * x + c * y
+    right0, right1, right2 = -dv_e_m_s[0], -dv_e_m_s[1], s.interval_s * G_M_S2 - dv_e_m_s[2]
+    # Eqn 4, divided by both lengths; by no less than gravity's, so that a fall without weight says nothing.
+    least = 0.5 * s.interval_s * G_M_S2
+    left_length = max(np.sqrt(left0 * left0 + left1 * left1 + left2 * left2), least)
+    right_length = max(np.sqrt(right0 * right0 + right1 * right1 + right2 * right2), least)
+    scale = 1.0 / (left_length * right_length)
+    north, east = scale * (left1 * right2 - left2 * right1), scale * (left2 * right0 - left0 * right2)
+    s.error_e[0], s.error_e[1] = c * north + z * east, c * east - z * north
+    # About the vertical Eqn 4 sees the true heading: a matrix that is to show the course has no use for that.
+    s.error_e[2] = scale * (left0 * right1 - left1 * right0) if s.yaw_reference != COURSE else 0.0
+    correct_tilt(s, s.error_e, s.w_rp, s.interval_s)
+
+
+@kernel
+def stand_in(s):  # type: ignore[no-untyped-def]
+    """The paper's roll-pitch correction (Eqns 25 to 27) over the time since it was last worked out.
+
+    Integrated, omega x V is the speed times the change of the nose.
+    """
+    interval_s = s.clock_s - s.stand_in_t_s
+    speed = 0.0
+    if s.fix_age_s <= LOCK_LIFE_S:
+        speed = np.hypot(s.air_m_s[0], s.air_m_s[1]) if s.wind_known else np.hypot(s.v_e_m_s[0], s.v_e_m_s[1])
+    for i in range(3):
+        felt, nose = s.felt_g_m_s[i], s.R_gb[i, 0]
+        s.error_e[i] = felt - s.stand_in_g[i] + speed * (nose - s.stand_in_g[3 + i])  # Eqns 25 and 26
+        s.stand_in_g[i], s.stand_in_g[3 + i] = felt, nose
+    s.stand_in_t_s = s.clock_s
+    if interval_s > 2.0 * STAND_IN_S or s.unfelt_s > 0.0:
+        return
+    x, y, z = to_earth(s, s.error_e)
+    length = np.sqrt(x * x + y * y + z * z)
+    if length > 0.0 and abs(length / (interval_s * G_M_S2) - 1.0) <= s.launch_gate:
+        s.error_e[0], s.error_e[1], s.error_e[2] = y / length, -x / length, 0.0  # Eqn 27: seen in earth, x down
+        correct_tilt(s, s.error_e, s.w_start, interval_s)
+
+
+@kernel
+def yaw_at_fix(s):  # type: ignore[no-untyped-def]
+    """Learn the wind, and compare the nose of the fix with the velocity over the ground or through the air."""
+    north, east, _ = to_earth(s, s.at_fix_g[3:])
+    v_north, v_east = s.v_e_m_s[0], s.v_e_m_s[1]
+    if np.hypot(v_north, v_east) < s.min_speed_m_s:
+        return
+    c, z = np.cos(s.yaw_applied_rad), np.sin(s.yaw_applied_rad)
+    learn_wind(s, c * north + z * east, c * east - z * north, v_north, v_east, s.interval_s)
+    if s.yaw_reference == MAGNETOMETER:
+        return
+    if s.yaw_reference == NOSE:
+        v_north, v_east = v_north - s.wind_e_m_s[0], v_east - s.wind_e_m_s[1]
+    speed = np.hypot(v_north, v_east)
+    if speed >= s.min_speed_m_s:
+        sine, cosine = (north * v_east - east * v_north) / speed, (north * v_north + east * v_east) / speed
+        correct_yaw(s, sine, cosine, np.hypot(north, east), s.interval_s)
+
+
+@kernel
+def take_fix(row, s):  # type: ignore[no-untyped-def]
+    """All that happens at a GPS report."""
+    v = row.gps_v_e_m_s
+    if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
+        s.rejected += 1
+        return
+    before0, before1, before2 = s.at_fix_g[0], s.at_fix_g[1], s.at_fix_g[2]
+    t_s = s.clock_s - s.gps_latency_s
+    recall(s, t_s)
+    s.since_fix_g_m_s[0] = s.at_fix_g[0] - before0
+    s.since_fix_g_m_s[1] = s.at_fix_g[1] - before1
+    s.since_fix_g_m_s[2] = s.at_fix_g[2] - before2
+    s.interval_s = t_s - s.fix_t_s
+    s.fix_t_s, s.fix_age_s = t_s, 0.0
+    for i in range(3):
+        s.error_e[i] = v[i] - s.v_e_m_s[i]
+        s.v_e_m_s[i] = v[i]
+    if 0.0 < s.interval_s <= FIX_LIFE_S:
+        if s.locked and s.clock_s >= s.blind_until_s:
+            roll_pitch_at_fix(s, s.error_e)
+        yaw_at_fix(s)
+
+
+@kernel
+def take_mag(row, s):  # type: ignore[no-untyped-def]
+    """Turn the nose by what the horizontal field is off magnetic north."""
+    m = row.mag_b_ut
+    if not (abs(m[0]) < 1e4 and abs(m[1]) < 1e4 and abs(m[2]) < 1e4):
+        s.rejected += 1
+        return
+    R = s.R_eb
+    north = R[0, 0] * m[0] + R[0, 1] * m[1] + R[0, 2] * m[2]
+    east = R[1, 0] * m[0] + R[1, 1] * m[1] + R[1, 2] * m[2]
+    length, interval_s = np.hypot(north, east), s.clock_s - s.mag_t_s
+    s.mag_t_s = s.clock_s
+    if length > 0.0 and 0.0 < interval_s <= FIX_LIFE_S:
+        c, z = np.cos(s.declination_rad), np.sin(s.declination_rad)
+        sine, cosine = (north * z - east * c) / length, (north * c + east * z) / length
+        correct_yaw(s, sine, cosine, 1.0, interval_s)
+
+
+@kernel
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One inertial sample, and the report that came with it.
+
+    Parameters
+    ----------
+    rows : shape (N,), MEASURED_DTYPE    not written
+    k : int                              the tick
+    state : shape (1,), STATE_DTYPE      read and written
+
+    Returns
+    -------
+    int    the `Health` of this tick's estimate
+    """
+    row, s = rows[k], state[0]
+    before, t_before = s.rejected, s.t_s
+    good = screen(row, s)
+    if good:
+        for i in range(3):
+            s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
+        take_rate(row, s, good)
+        sum_up(row, s, good)
+        attitude(s)
+        if s.t_s - t_before > LONGEST_GAP_S:  # what happened meanwhile is in the reports and not in the sums
+            s.blind_until_s = s.clock_s + s.gps_latency_s + 3.0 * s.gps_filter_s
+        s.fix_age_s += s.dt_s
+        if row.gps_new:
+            take_fix(row, s)
+        if row.mag_new and s.yaw_reference == MAGNETOMETER:
+            take_mag(row, s)
+        if s.fix_age_s > LOCK_LIFE_S and s.yaw_reference != MAGNETOMETER:
+            s.locked = 0
+        if not (s.locked and s.fix_age_s <= FIX_LIFE_S) and s.clock_s - s.stand_in_t_s >= STAND_IN_S:
+            stand_in(s)
+    if s.rejected != before:
+        return 2  # Health.POOR
+    if not s.locked:
+        return 0  # Health.STARTING
+    return 1 if s.fix_age_s <= FIX_LIFE_S else 2  # Health.GOOD
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+        write_wind(state[0], estimates[k])
+
+
+class GpsVelocity(Compiled):
+    """The note's estimator; see the module.
+
+    Parameters
+    ----------
+    params : gains and options; the defaults suit a model aeroplane with a 1 s, 0.3 s late GPS.  `heading_reference`
+        follows from their `yaw_reference`: "course", or "nose" for the other two
+    """
+
+    heading_reference: HeadingReference = "course"
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
+    _default: ClassVar[GpsVelocityParams] = GpsVelocityParams()
+
+    def __init__(self, params: GpsVelocityParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or self._default
+        self.heading_reference = "course" if self.params.yaw_reference == "course" else "nose"
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
+
+        Without a sample (a start in the air), or where it is not of something at rest: offset zero, level.
+        """
+        s = self._state[0]
+        self._state.fill(0)
+        for f in fields(self.params):
+            value = getattr(self.params, f.name)
+            s[f.name] = YAW_REFERENCES.index(value) if f.name == "yaw_reference" else value
+        R = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        s["R_eb"] = s["R_gb"] = R
+        s["R_eg"] = np.eye(3)
+        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+        s["fix_age_s"] = math.inf
+        s["fix_t_s"] = s["mag_t_s"] = -math.inf
+        # As if at rest before: the filtered integral of gravity is late by its time constant.
+        s["late_g"][2] = -G_M_S2 * self.params.gps_filter_s
+        s["late_g"][3:] = s["stand_in_g"][3:] = R[:, 0]
+        s["history"] = s["at_fix_g"] = s["late_g"]
+
+
+class GpsVelocityNose(GpsVelocity):
+    """The same, its heading that of the nose: the wind is learnt in turns and taken off the GPS velocity."""
+
+    _default = GpsVelocityParams(yaw_reference="nose")
+
+
+class GpsVelocityMagnetometer(GpsVelocity):
+    """The same, its heading that of the nose, from the magnetometer."""
+
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer")
+    _default = GpsVelocityParams(yaw_reference="magnetometer")
