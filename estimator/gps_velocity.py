@@ -173,6 +173,8 @@ _STATE = (
     Column("stand_in_t_s", (), "start of the interval of the stand-in"),
     Column("stand_in_g", (6,), "felt integral and nose then"),
     Column("error_e", (3,), "the error being worked on, earth axes, Eqn 4"),
+    Column("error_g", (3,), "the same, axes of the gyros' earth"),
+    Column("crab", (2,), "cosine and sine of the angle from the nose to the heading that is told"),
     Column("total_b", (3,), "weighted error, Eqn 28"),
     Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
     Column("near_s", (), "how long the yaw error has been small"),
@@ -205,10 +207,11 @@ def attitude(s):  # type: ignore[no-untyped-def]
         z = s.tilt_rate_e[2] * tilt_s + s.yaw_rate_e[2] * yaw_s
         s.yaw_applied_rad += z
         turn_earth(s.R_eg, (x, y, z), 1.0)
-    for i in range(3):
-        a, b, c = s.R_eg[i, 0], s.R_eg[i, 1], s.R_eg[i, 2]
-        for j in range(3):
-            s.R_eb[i, j] = a * s.R_gb[0, j] + b * s.R_gb[1, j] + c * s.R_gb[2, j]
+    for j in range(3):
+        x = s.R_eg[0, 0] * s.R_gb[0, j] + s.R_eg[0, 1] * s.R_gb[1, j] + s.R_eg[0, 2] * s.R_gb[2, j]
+        y = s.R_eg[1, 0] * s.R_gb[0, j] + s.R_eg[1, 1] * s.R_gb[1, j] + s.R_eg[1, 2] * s.R_gb[2, j]
+        z = s.R_eg[2, 0] * s.R_gb[0, j] + s.R_eg[2, 1] * s.R_gb[1, j] + s.R_eg[2, 2] * s.R_gb[2, j]
+        s.R_eb[0, j], s.R_eb[1, j], s.R_eb[2, j] = s.crab[0] * x - s.crab[1] * y, s.crab[1] * x + s.crab[0] * y, z
 
 
 @kernel
@@ -286,7 +289,9 @@ def recall(s, t_s):  # type: ignore[no-untyped-def]
 def correct(s, error_e, weight, interval_s, rate_e):  # type: ignore[no-untyped-def]
     """Give an error to the PI controller (Eqns 5, 28 and 29) and set `rate_e`, which removes it within the interval."""
     for i in range(3):
-        along = s.R_eb[0, i] * error_e[0] + s.R_eb[1, i] * error_e[1] + s.R_eb[2, i] * error_e[2]  # Eqn 5
+        s.error_g[i] = s.R_eg[0, i] * error_e[0] + s.R_eg[1, i] * error_e[1] + s.R_eg[2, i] * error_e[2]
+    for i in range(3):
+        along = s.R_gb[0, i] * s.error_g[0] + s.R_gb[1, i] * s.error_g[1] + s.R_gb[2, i] * s.error_g[2]  # Eqn 5
         s.total_b[i] = weight * along
     w = s.omega_b_rad_s
     turning = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) >= s.integrate_below_rad_s
@@ -334,30 +339,18 @@ def to_earth(s, v_g):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def crab_rad(s):  # type: ignore[no-untyped-def]
-    """Angle from the heading of the matrix to that of the nose; zero where they are the same or nobody knows."""
-    if s.yaw_reference != COURSE or not s.wind_known:
-        return 0.0
-    return np.arctan2(s.air_m_s[1], s.air_m_s[0]) - s.yaw_applied_rad
-
-
-@kernel
 def roll_pitch_at_fix(s, dv_e_m_s):  # type: ignore[no-untyped-def]
     """Eqns 3 and 4 over the interval between two fixes, `dv_e_m_s` the change of the reported velocity."""
-    x, y, left2 = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
-    crab = crab_rad(s)
-    c, z = np.cos(crab), np.sin(crab)
-    left0, left1 = c * x - z * y, z * x + c * y
+    left0, left1, left2 = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
     right0, right1, right2 = -dv_e_m_s[0], -dv_e_m_s[1], s.interval_s * G_M_S2 - dv_e_m_s[2]
-    # Eqn 4, divided by both lengths; by no less than gravity's, so that a fall without weight says nothing.
+    # Eqn 4, divided by both lengths; by no less than half of gravity's, so that a fall without weight says little.
     least = 0.5 * s.interval_s * G_M_S2
     left_length = max(np.sqrt(left0 * left0 + left1 * left1 + left2 * left2), least)
     right_length = max(np.sqrt(right0 * right0 + right1 * right1 + right2 * right2), least)
     scale = 1.0 / (left_length * right_length)
-    north, east = scale * (left1 * right2 - left2 * right1), scale * (left2 * right0 - left0 * right2)
-    s.error_e[0], s.error_e[1] = c * north + z * east, c * east - z * north
-    # About the vertical Eqn 4 sees the true heading: a matrix that is to show the course has no use for that.
-    s.error_e[2] = scale * (left0 * right1 - left1 * right0) if s.yaw_reference != COURSE else 0.0
+    s.error_e[0] = scale * (left1 * right2 - left2 * right1)
+    s.error_e[1] = scale * (left2 * right0 - left0 * right2)
+    s.error_e[2] = scale * (left0 * right1 - left1 * right0)
     correct_tilt(s, s.error_e, s.w_rp, s.interval_s)
 
 
@@ -396,12 +389,21 @@ def yaw_at_fix(s):  # type: ignore[no-untyped-def]
     learn_wind(s, c * north + z * east, c * east - z * north, v_north, v_east, s.interval_s)
     if s.yaw_reference == MAGNETOMETER:
         return
-    if s.yaw_reference == NOSE:
-        v_north, v_east = v_north - s.wind_e_m_s[0], v_east - s.wind_e_m_s[1]
-    speed = np.hypot(v_north, v_east)
-    if speed >= s.min_speed_m_s:
-        sine, cosine = (north * v_east - east * v_north) / speed, (north * v_north + east * v_east) / speed
-        correct_yaw(s, sine, cosine, np.hypot(north, east), s.interval_s)
+    # The nose of now, and the velocity through the air that is expected along it.
+    x, y, _ = to_earth(s, s.R_gb[:, 0])
+    f0, f1 = c * x + z * y, c * y - z * x
+    air0, air1 = s.air_m_s[0] * f0 - s.air_m_s[1] * f1, s.air_m_s[0] * f1 + s.air_m_s[1] * f0
+    speed = np.hypot(air0, air1)
+    if speed < s.min_speed_m_s:
+        return
+    sine, cosine = (x * air1 - y * air0) / speed, (x * air0 + y * air1) / speed
+    correct_yaw(s, sine, cosine, np.hypot(x, y), s.interval_s)
+    if s.yaw_reference == COURSE:
+        over0, over1 = air0 + s.wind_e_m_s[0], air1 + s.wind_e_m_s[1]
+        over = np.hypot(over0, over1)
+        if over >= s.min_speed_m_s:
+            s.crab[0] = (air0 * over0 + air1 * over1) / (speed * over)
+            s.crab[1] = (air0 * over1 - air1 * over0) / (speed * over)
 
 
 @kernel
@@ -528,6 +530,7 @@ class GpsVelocity(Compiled):
         R = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         s["R_eb"] = s["R_gb"] = R
         s["R_eg"] = np.eye(3)
+        s["crab"][0] = 1.0
         s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
         s["fix_age_s"] = math.inf
