@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.interface import AttitudeEstimate, Column, Health, Instrument, Measurements, dtype_of
-from estimator.jit import kernel
+from estimator.jit import inlined
 
 BELIEF = (
     Column("R_eb", (3, 3), "estimated body-to-earth rotation"),
@@ -32,7 +32,7 @@ ESTIMATE_DTYPE = dtype_of(ESTIMATE)
 _HEALTH = tuple(Health)  # an index into a tuple costs a tenth of a call of the enumeration
 
 
-@kernel
+@inlined
 def write_estimate(s, health, estimate):  # type: ignore[no-untyped-def]
     """Copy the belief of the state record `s` into a record of ESTIMATE."""
     estimate.health = health
@@ -43,7 +43,7 @@ def write_estimate(s, health, estimate):  # type: ignore[no-untyped-def]
             estimate.R_eb[i, j] = s.R_eb[i, j]
 
 
-@kernel
+@inlined
 def write_wind(s, estimate):  # type: ignore[no-untyped-def]
     """Copy the wind that the state record `s` believes in into a record of ESTIMATE, where it is known."""
     if s.wind_known:
