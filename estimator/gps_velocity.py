@@ -6,18 +6,19 @@ An accelerometer feels gravity minus acceleration (Eqn 1), and the attitude carr
 attack and no sideslip is assumed, so the method holds in turns, in wind and in loops, where the centrifugal
 term of the first paper does not.
 
-Two frames
-----------
-``g`` is the earth as the gyros alone have it: ``R_gb`` integrates the corrected rate and nothing else.  All
-proportional corrections go into ``R_eg``, and the attitude is ``R_eb = R_eg @ R_gb`` (Eqns 16 and 17, with the
-proportional term of Eqn 29 applied from the earth's side).  What is summed, filtered and remembered lives in ``g``,
-so that every correction turns the whole memory with it: lag in the reports is then no lag in the feedback loop.
-
 Lag
 ---
-A receiver reports velocity filtered and late.  The left side of Eqn 3 and the nose pass the same filter and are
-recalled from one latency ago.  An error that is left at a report is removed evenly until the next one, by
-1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
+A receiver reports velocity filtered and late.  The left side of Eqn 3, and the nose, pass the same filter and are
+recalled from one latency ago, with all corrections that were made since (`estimator.gyro_frame`).  An error found at a
+report is removed evenly until the next one, by 1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
+
+Yaw
+---
+``course`` and ``nose``: the matrix itself is turned to the nose, which is where the velocity through the air points
+(Eqns 22 to 24 of the paper of 2009, with v_gps - wind for the course).  The wind is learnt in turns
+(`estimator.wind`); as long as none has been flown that is the course over ground.  ``course`` then tells the heading
+of the paper: the matrix is handed out turned by the crab angle.  So Eqn 4 compares along the true heading whatever is
+told; along the course a crab of 23 degrees becomes a tilt in every turn.  ``magnetometer``: to magnetic north.
 
 Before the yaw is locked
 ------------------------
@@ -25,13 +26,6 @@ With an unknown heading an acceleration along the ground is taken for a tilt: in
 nose has come near the reference, and where no reports come, the paper of 2009 stands in (Eqns 25 to 27): the
 acceleration is the speed times the turning of the nose.  Summed up, that is Eqn 3 with the velocity along the nose.
 And nothing is corrected while the length of what is then taken for gravity is not gravity's.
-
-Yaw
----
-``course``: the nose is turned to the course over ground (Eqns 22 to 24), lag-matched.  ``nose``: to the velocity
-through the air, the wind being learnt in turns (`estimator.wind`); until then that is the course.
-``magnetometer``: to magnetic north.  A heading that is locked to the course is off by the crab angle, and Eqn 4 would
-turn that into a tilt in turns: once the wind is known, the left side is compared along the true heading.
 
 References
 ----------
@@ -46,17 +40,14 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.gyro_frame import GYRO_FRAME, LONGEST_LATENCY_S, attitude, recall, start_gyro_frame, sum_up, to_earth
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.pi import feed_back
-from estimator.rotation import integrate, level, renormalise
 from estimator.screening import (
-    COAST_S,
-    FORCE_GOOD,
     FORCE_RANGE_M_S2,
     G_M_S2,
     GYRO_RANGE_RAD_S,
-    LONGEST_GAP_S,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
@@ -65,8 +56,6 @@ from estimator.screening import (
 )
 from estimator.wind import WIND_FILTER, learn_wind
 
-HISTORY, SPACING_S = 640, 0.0199  # remembered instants and their least distance: 12.7 s at any sample rate
-LONGEST_LATENCY_S = 12.5
 FIX_LIFE_S = 2.5  # reports further apart are compared no more
 LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown
 STAND_IN_S = 0.1  # how often the paper's correction is worked out where it stands in
@@ -145,144 +134,22 @@ _PARAMS = tuple(
 _STATE = (
     Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
     Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
-    Column("R_gb", (3, 3), "attitude as the gyros alone have it"),
-    Column("R_eg", (3, 3), "product of all corrections"),
-    Column("yaw_applied_rad", (), "part of them about the vertical"),
-    Column("tilt_rate_e", (3,), "rate of the roll-pitch correction under way"),
-    Column("tilt_left_s", (), "for how long still"),
-    Column("yaw_rate_e", (3,), "rate of the yaw correction under way"),
-    Column("yaw_left_s", (), "for how long still"),
-    Column("felt_g_m_s", (3,), "integral of what the accelerometer feels, left side of Eqn 3"),
-    Column("force_g_m_s2", (3,), "the last of its summands"),
-    Column("late_g", (6,), "that integral and the nose, through the receiver's filter"),
-    Column("weights_dt_s", (), "sample interval to which the next two belong"),
-    Column("before", (), "filter: weight of its last output"),
-    Column("end", (), "filter: weight of the input at the end of the interval"),
-    Column("history_t_s", (HISTORY,), "when each remembered `late_g` was"),
-    Column("history", (HISTORY, 6), "remembered `late_g`"),
-    Column("newest", (), "index of the newest of them", integer=True),
-    Column("at_fix_g", (6,), "`late_g` of the last fix"),
     Column("since_fix_g_m_s", (3,), "left side of Eqn 3 over the last interval"),
     Column("fix_t_s", (), "when the last fix was true, by the clock of the state"),
     Column("interval_s", (), "from the fix before it"),
     Column("v_e_m_s", (3,), "velocity of the last fix"),
     Column("fix_age_s", (), "time since a fix arrived"),
     Column("mag_t_s", (), "when the magnetometer spoke last"),
-    Column("blind_until_s", (), "until then the sums have a hole in them"),
-    Column("unfelt_s", (), "how long the accelerometer has been broken"),
     Column("stand_in_t_s", (), "start of the interval of the stand-in"),
     Column("stand_in_g", (6,), "felt integral and nose then"),
     Column("error_e", (3,), "the error being worked on, earth axes, Eqn 4"),
     Column("error_g", (3,), "the same, axes of the gyros' earth"),
-    Column("crab", (2,), "cosine and sine of the angle from the nose to the heading that is told"),
     Column("total_b", (3,), "weighted error, Eqn 28"),
     Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
 )
-STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + _PARAMS + _STATE)
-
-
-@kernel
-def turn_earth(R, omega_e, dt_s):  # type: ignore[no-untyped-def]
-    """Rotate `R` from the earth's side, in place and renormalised: each column c becomes c + omega x c dt."""
-    x, y, z = omega_e[0] * dt_s, omega_e[1] * dt_s, omega_e[2] * dt_s
-    for j in range(3):
-        a, b, c = R[0, j], R[1, j], R[2, j]
-        R[0, j] = a + y * c - z * b
-        R[1, j] = b + z * a - x * c
-        R[2, j] = c + x * b - y * a
-    if not renormalise(R):
-        level(R)
-
-
-@kernel
-def attitude(s):  # type: ignore[no-untyped-def]
-    """Apply what is under way of the corrections, and set ``R_eb = R_eg @ R_gb``."""
-    if s.tilt_left_s > 0.0 or s.yaw_left_s > 0.0:
-        tilt_s, yaw_s = min(s.tilt_left_s, s.dt_s), min(s.yaw_left_s, s.dt_s)
-        s.tilt_left_s -= tilt_s
-        s.yaw_left_s -= yaw_s
-        x, y = s.tilt_rate_e[0] * tilt_s, s.tilt_rate_e[1] * tilt_s
-        z = s.tilt_rate_e[2] * tilt_s + s.yaw_rate_e[2] * yaw_s
-        s.yaw_applied_rad += z
-        turn_earth(s.R_eg, (x, y, z), 1.0)
-    for j in range(3):
-        x = s.R_eg[0, 0] * s.R_gb[0, j] + s.R_eg[0, 1] * s.R_gb[1, j] + s.R_eg[0, 2] * s.R_gb[2, j]
-        y = s.R_eg[1, 0] * s.R_gb[0, j] + s.R_eg[1, 1] * s.R_gb[1, j] + s.R_eg[1, 2] * s.R_gb[2, j]
-        z = s.R_eg[2, 0] * s.R_gb[0, j] + s.R_eg[2, 1] * s.R_gb[1, j] + s.R_eg[2, 2] * s.R_gb[2, j]
-        s.R_eb[0, j], s.R_eb[1, j], s.R_eb[2, j] = s.crab[0] * x - s.crab[1] * y, s.crab[1] * x + s.crab[0] * y, z
-
-
-@kernel
-def filter_weights(s):  # type: ignore[no-untyped-def]
-    """Weights of the receiver's filter for an input that is linear within the interval: its exact solution."""
-    s.weights_dt_s = s.dt_s
-    if s.gps_filter_s > 0.0:
-        part = s.dt_s / s.gps_filter_s
-        s.before = np.exp(-part)
-        s.end = 1.0 - (1.0 - s.before) / part
-    else:
-        s.before, s.end = 0.0, 1.0
-
-
-@kernel
-def sum_up(row, s, good):  # type: ignore[no-untyped-def]
-    """Integrate the gyros (Eqn 17) and the left side of Eqn 3, pass both through the receiver's filter, remember."""
-    R, w, h = s.R_gb, s.omega_b_rad_s, 0.5 * s.dt_s
-    nose0, nose1, nose2 = R[0, 0], R[1, 0], R[2, 0]
-    if not integrate(R, w, s.dt_s):
-        level(s.R_eg)
-        s.locked = 0
-    if good & FORCE_GOOD:
-        # Eqn 1: the note's accelerometer is gravity minus acceleration, -f.  It is a mean over the interval: half an
-        # interval earlier the body had not turned as far, A - (omega x A) dt / 2.
-        x, y, z = -row.force_b_m_s2[0], -row.force_b_m_s2[1], -row.force_b_m_s2[2]
-        a, b, c = x - h * (w[1] * z - w[2] * y), y - h * (w[2] * x - w[0] * z), z - h * (w[0] * y - w[1] * x)
-        for i in range(3):
-            s.force_g_m_s2[i] = R[i, 0] * a + R[i, 1] * b + R[i, 2] * c  # Eqn 2
-        s.unfelt_s = 0.0
-    else:
-        s.unfelt_s += s.dt_s
-        if s.unfelt_s > COAST_S:
-            s.blind_until_s = s.clock_s + s.gps_latency_s + 3.0 * s.gps_filter_s
-    if s.weights_dt_s != s.dt_s:
-        filter_weights(s)
-    before, end = s.before, s.end
-    start = 1.0 - before - end
-    for i in range(3):
-        felt = s.felt_g_m_s[i]
-        s.felt_g_m_s[i] = felt + s.force_g_m_s2[i] * s.dt_s  # Eqn 3
-        s.late_g[i] = before * s.late_g[i] + start * felt + end * s.felt_g_m_s[i]
-    s.late_g[3] = before * s.late_g[3] + start * nose0 + end * R[0, 0]
-    s.late_g[4] = before * s.late_g[4] + start * nose1 + end * R[1, 0]
-    s.late_g[5] = before * s.late_g[5] + start * nose2 + end * R[2, 0]
-    if s.clock_s - s.history_t_s[s.newest] >= SPACING_S:
-        s.newest = (s.newest + 1) % HISTORY
-        s.history_t_s[s.newest] = s.clock_s
-        for i in range(6):
-            s.history[s.newest, i] = s.late_g[i]
-
-
-@kernel
-def recall(s, t_s):  # type: ignore[no-untyped-def]
-    """Set ``s.at_fix_g`` to `late_g` at `t_s`, between two remembered instants, or the oldest there is."""
-    newer, part, t1 = -1, 0.0, s.clock_s  # -1: the present
-    i = s.newest
-    for back in range(HISTORY):
-        i = (s.newest - back) % HISTORY
-        t0 = s.history_t_s[i]
-        if t0 > t1:  # came round to a newer one: the previous was the oldest
-            i, part = newer, 0.0
-            break
-        if t0 <= t_s:
-            part = (t_s - t0) / (t1 - t0) if t1 > t0 else 0.0
-            break
-        newer, t1 = i, t0
-    for j in range(6):
-        older_value = s.history[i, j]
-        newer_value = s.history[newer, j] if newer >= 0 else s.late_g[j]
-        s.at_fix_g[j] = older_value + part * (newer_value - older_value)
+STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + GYRO_FRAME + _PARAMS + _STATE)
 
 
 @kernel
@@ -325,17 +192,6 @@ def correct_yaw(s, sine, cosine, length, interval_s):  # type: ignore[no-untyped
     s.error_e[2] = ground  # Eqn 24: along the vertical
     correct(s, s.error_e, s.w_y, interval_s, s.yaw_rate_e)
     s.yaw_left_s = interval_s
-
-
-@kernel
-def to_earth(s, v_g):  # type: ignore[no-untyped-def]
-    """`v_g` of shape (3,) with all corrections up to now, as a tuple."""
-    R = s.R_eg
-    return (
-        R[0, 0] * v_g[0] + R[0, 1] * v_g[1] + R[0, 2] * v_g[2],
-        R[1, 0] * v_g[0] + R[1, 1] * v_g[1] + R[1, 2] * v_g[2],
-        R[2, 0] * v_g[0] + R[2, 1] * v_g[1] + R[2, 2] * v_g[2],
-    )
 
 
 @kernel
@@ -469,10 +325,9 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         for i in range(3):
             s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
         take_rate(row, s, good)
-        sum_up(row, s, good)
+        if not sum_up(row, s, good, s.t_s - t_before):
+            s.locked = 0
         attitude(s)
-        if s.t_s - t_before > LONGEST_GAP_S:  # what happened meanwhile is in the reports and not in the sums
-            s.blind_until_s = s.clock_s + s.gps_latency_s + 3.0 * s.gps_filter_s
         s.fix_age_s += s.dt_s
         if row.gps_new:
             take_fix(row, s)
@@ -528,17 +383,12 @@ class GpsVelocity(Compiled):
             value = getattr(self.params, f.name)
             s[f.name] = YAW_REFERENCES.index(value) if f.name == "yaw_reference" else value
         R = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        s["R_eb"] = s["R_gb"] = R
-        s["R_eg"] = np.eye(3)
-        s["crab"][0] = 1.0
+        start_gyro_frame(s, R)
         s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
         s["fix_age_s"] = math.inf
         s["fix_t_s"] = s["mag_t_s"] = -math.inf
-        # As if at rest before: the filtered integral of gravity is late by its time constant.
-        s["late_g"][2] = -G_M_S2 * self.params.gps_filter_s
-        s["late_g"][3:] = s["stand_in_g"][3:] = R[:, 0]
-        s["history"] = s["at_fix_g"] = s["late_g"]
+        s["stand_in_g"][3:] = R[:, 0]
 
 
 class GpsVelocityNose(GpsVelocity):
