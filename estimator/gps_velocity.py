@@ -42,7 +42,7 @@ import numpy as np
 from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
 from estimator.gyro_frame import GYRO_FRAME, LONGEST_LATENCY_S, attitude, recall, start_gyro_frame, sum_up, to_earth
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
-from estimator.jit import kernel
+from estimator.jit import inlined, kernel
 from estimator.pi import feed_back
 from estimator.screening import (
     FORCE_RANGE_M_S2,
@@ -167,6 +167,7 @@ def correct(s, error_e, weight, interval_s, rate_e):  # type: ignore[no-untyped-
     k_i = 0.0 if turning else s.k_i
     feed_back(s.total_b, k_p, k_i, s.offset_limit_rad_s, interval_s, s.omega_p_b, s.omega_i_b)
     for i in range(3):
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
         rate_e[i] = k_p * weight * error_e[i]
 
 
@@ -304,7 +305,7 @@ def take_mag(row, s):  # type: ignore[no-untyped-def]
         correct_yaw(s, sine, cosine, 1.0, interval_s)
 
 
-@kernel
+@inlined
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One inertial sample, and the report that came with it.
 
@@ -322,9 +323,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     before, t_before = s.rejected, s.t_s
     good = screen(row, s)
     if good:
-        for i in range(3):
-            s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
-        take_rate(row, s, good)
+        take_rate(row, s, good)  # Eqn 16
         if not sum_up(row, s, good, s.t_s - t_before):
             s.locked = 0
         attitude(s)
