@@ -40,7 +40,16 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
-from estimator.gyro_frame import GYRO_FRAME, LONGEST_LATENCY_S, attitude, recall, start_gyro_frame, sum_up, to_earth
+from estimator.gyro_frame import (
+    GYRO_FRAME,
+    LONGEST_LATENCY_S,
+    apply_corrections,
+    attitude,
+    recall,
+    start_gyro_frame,
+    sum_up,
+    to_earth,
+)
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import inlined, kernel
 from estimator.pi import feed_back
@@ -143,7 +152,7 @@ _STATE = (
     Column("stand_in_t_s", (), "start of the interval of the stand-in"),
     Column("stand_in_g", (6,), "felt integral and nose then"),
     Column("error_e", (3,), "the error being worked on, earth axes, Eqn 4"),
-    Column("error_g", (3,), "the same, axes of the gyros' earth"),
+    Column("error_g", (3,), "the same, or another vector, axes of the gyros' earth"),
     Column("total_b", (3,), "weighted error, Eqn 28"),
     Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
     Column("near_s", (), "how long the yaw error has been small"),
@@ -217,6 +226,7 @@ def stand_in(s):  # type: ignore[no-untyped-def]
 
     Integrated, omega x V is the speed times the change of the nose.
     """
+    apply_corrections(s)
     interval_s = s.clock_s - s.stand_in_t_s
     speed = 0.0
     if s.fix_age_s <= LOCK_LIFE_S:
@@ -270,6 +280,7 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
     if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
         s.rejected += 1
         return
+    apply_corrections(s)
     before0, before1, before2 = s.at_fix_g[0], s.at_fix_g[1], s.at_fix_g[2]
     t_s = s.clock_s - s.gps_latency_s
     recall(s, t_s)
@@ -294,9 +305,10 @@ def take_mag(row, s):  # type: ignore[no-untyped-def]
     if not (abs(m[0]) < 1e4 and abs(m[1]) < 1e4 and abs(m[2]) < 1e4):
         s.rejected += 1
         return
-    R = s.R_eb
-    north = R[0, 0] * m[0] + R[0, 1] * m[1] + R[0, 2] * m[2]
-    east = R[1, 0] * m[0] + R[1, 1] * m[1] + R[1, 2] * m[2]
+    apply_corrections(s)
+    for i in range(3):
+        s.error_g[i] = s.R_gb[i, 0] * m[0] + s.R_gb[i, 1] * m[1] + s.R_gb[i, 2] * m[2]
+    north, east, _ = to_earth(s, s.error_g)
     length, interval_s = np.hypot(north, east), s.clock_s - s.mag_t_s
     s.mag_t_s = s.clock_s
     if length > 0.0 and 0.0 < interval_s <= FIX_LIFE_S:

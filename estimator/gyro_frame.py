@@ -24,17 +24,20 @@ from estimator.screening import COAST_S, FORCE_GOOD, G_M_S2, LONGEST_GAP_S
 
 HISTORY, SPACING_S = 640, 0.0199  # remembered instants and their least distance: 12.7 s at any sample rate
 LONGEST_LATENCY_S = 12.5
+DUE_S = 0.05  # corrections, slow as they are, are applied in parts no shorter than this
 FLUSHED = 3.0  # after so many time constants the filter has forgotten
 
 GYRO_FRAME = (
     Column("R_gb", (3, 3), "attitude as the gyros alone have it"),
     Column("R_eg", (3, 3), "product of all corrections"),
+    Column("R_og", (3, 3), "the same, turned about the vertical to the heading that is told"),
     Column("yaw_applied_rad", (), "part of them about the vertical"),
     Column("crab", (2,), "cosine and sine of the angle from the nose to the heading that is told"),
     Column("tilt_rate_e", (3,), "rate of the roll-pitch correction under way"),
     Column("tilt_left_s", (), "for how long still"),
     Column("yaw_rate_e", (3,), "rate of the yaw correction under way"),
     Column("yaw_left_s", (), "for how long still"),
+    Column("due_s", (), "time for which they have not been applied yet"),
     Column("felt_g_m_s", (3,), "integral of gravity minus acceleration"),
     Column("force_g_m_s2", (3,), "the last of its summands"),
     Column("late_g", (6,), "that integral, m/s, and the nose, through the receiver's filter"),
@@ -54,7 +57,7 @@ GYRO_FRAME = (
 def start_gyro_frame(s: np.void, R_eb: Array) -> None:
     """Set the columns of `GYRO_FRAME` in the zeroed record `s`: at rest in the attitude `R_eb` since long ago."""
     s["R_eb"] = s["R_gb"] = R_eb
-    s["R_eg"] = np.eye(3)
+    s["R_eg"] = s["R_og"] = np.eye(3)
     s["crab"][0] = 1.0
     s["late_g"][2] = -G_M_S2 * s["gps_filter_s"]  # a filtered integral of gravity is late by the time constant
     s["late_g"][3:] = R_eb[:, 0]
@@ -110,6 +113,7 @@ def sum_up(row, s, good, gap_s):  # type: ignore[no-untyped-def]
     kept = integrate(R, s.omega_b_rad_s, s.dt_s)
     if not kept:
         level(s.R_eg)
+        level(s.R_og)
         go_blind(s)
     if gap_s > LONGEST_GAP_S:
         go_blind(s)
@@ -167,7 +171,7 @@ def to_earth(s, v_g):  # type: ignore[no-untyped-def]
 
 @inlined
 def turn_earth(R, x_rad, y_rad, z_rad):  # type: ignore[no-untyped-def]
-    """Rotate `R` by a small angle from the earth's side, in place: each column c becomes c + angle x c."""
+    """Rotate `R` by a small angle from the earth's side, in place and renormalised: each column c += angle x c."""
     for j in range(3):
         a, b, c = R[0, j], R[1, j], R[2, j]
         R[0, j] = a + y_rad * c - z_rad * b
@@ -177,11 +181,12 @@ def turn_earth(R, x_rad, y_rad, z_rad):  # type: ignore[no-untyped-def]
         level(R)
 
 
-@inlined
-def attitude(s):  # type: ignore[no-untyped-def]
-    """Apply what is under way of the corrections, and set ``R_eb = R_eg @ R_gb``, turned by the crab angle."""
-    if s.tilt_left_s > 0.0 or s.yaw_left_s > 0.0:
-        tilt_s, yaw_s = min(s.tilt_left_s, s.dt_s), min(s.yaw_left_s, s.dt_s)
+@kernel
+def apply_corrections(s):  # type: ignore[no-untyped-def]
+    """Apply what is due of the corrections under way; first thing at a report, which looks at the result."""
+    tilt_s, yaw_s = min(s.tilt_left_s, s.due_s), min(s.yaw_left_s, s.due_s)
+    s.due_s = 0.0
+    if tilt_s > 0.0 or yaw_s > 0.0:
         s.tilt_left_s -= tilt_s
         s.yaw_left_s -= yaw_s
         z_rad = s.tilt_rate_e[2] * tilt_s + s.yaw_rate_e[2] * yaw_s
@@ -189,5 +194,19 @@ def attitude(s):  # type: ignore[no-untyped-def]
         turn_earth(s.R_eg, s.tilt_rate_e[0] * tilt_s, s.tilt_rate_e[1] * tilt_s, z_rad)
     c, d = s.crab[0], s.crab[1]
     for j in range(3):
-        x, y, z = to_earth(s, (s.R_gb[0, j], s.R_gb[1, j], s.R_gb[2, j]))
-        s.R_eb[0, j], s.R_eb[1, j], s.R_eb[2, j] = c * x - d * y, d * x + c * y, z
+        x, y = s.R_eg[0, j], s.R_eg[1, j]
+        s.R_og[0, j], s.R_og[1, j], s.R_og[2, j] = c * x - d * y, d * x + c * y, s.R_eg[2, j]
+
+
+@inlined
+def attitude(s):  # type: ignore[no-untyped-def]
+    """Set ``R_eb = R_og @ R_gb``, corrections applied as they fall due."""
+    s.due_s += s.dt_s
+    if s.due_s >= DUE_S:
+        apply_corrections(s)
+    R, Q = s.R_og, s.R_gb
+    for i in range(3):
+        a, b, c = R[i, 0], R[i, 1], R[i, 2]
+        s.R_eb[i, 0] = a * Q[0, 0] + b * Q[1, 0] + c * Q[2, 0]
+        s.R_eb[i, 1] = a * Q[0, 1] + b * Q[1, 1] + c * Q[2, 1]
+        s.R_eb[i, 2] = a * Q[0, 2] + b * Q[1, 2] + c * Q[2, 2]
