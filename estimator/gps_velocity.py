@@ -162,7 +162,7 @@ STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + GYRO_FRAME + _PARAMS + _S
 
 
 @kernel
-def correct(s, error_e, weight, interval_s, rate_e):  # type: ignore[no-untyped-def]
+def correct(s, error_e, weight, k_i, interval_s, rate_e):  # type: ignore[no-untyped-def]
     """Give an error to the PI controller (Eqns 5, 28 and 29) and set `rate_e`, which removes it within the interval."""
     for i in range(3):
         s.error_g[i] = s.R_eg[0, i] * error_e[0] + s.R_eg[1, i] * error_e[1] + s.R_eg[2, i] * error_e[2]
@@ -173,8 +173,7 @@ def correct(s, error_e, weight, interval_s, rate_e):  # type: ignore[no-untyped-
     turning = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) >= s.integrate_below_rad_s
     decay = s.k_p * weight * interval_s
     k_p = s.k_p * (-np.expm1(-decay) / decay if decay > 0.0 else 1.0)
-    k_i = 0.0 if turning else s.k_i
-    feed_back(s.total_b, k_p, k_i, s.offset_limit_rad_s, interval_s, s.omega_p_b, s.omega_i_b)
+    feed_back(s.total_b, k_p, 0.0 if turning else k_i, s.offset_limit_rad_s, interval_s, s.omega_p_b, s.omega_i_b)
     for i in range(3):
         s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
         rate_e[i] = k_p * weight * error_e[i]
@@ -183,7 +182,7 @@ def correct(s, error_e, weight, interval_s, rate_e):  # type: ignore[no-untyped-
 @kernel
 def correct_tilt(s, error_e, weight, interval_s):  # type: ignore[no-untyped-def]
     """Roll-pitch error, earth axes, to be removed within `interval_s`."""
-    correct(s, error_e, weight, interval_s, s.tilt_rate_e)
+    correct(s, error_e, weight, s.k_i, interval_s, s.tilt_rate_e)
     s.tilt_left_s = interval_s
 
 
@@ -200,7 +199,8 @@ def correct_yaw(s, sine, cosine, length, interval_s):  # type: ignore[no-untyped
     ground = sine if cosine >= 0.0 else np.copysign(length, sine)  # Eqn 23
     s.error_e[0] = s.error_e[1] = 0.0
     s.error_e[2] = ground  # Eqn 24: along the vertical
-    correct(s, s.error_e, s.w_y, interval_s, s.yaw_rate_e)
+    k_i = s.k_i if s.locked else 0.0  # finding the yaw is no gyro offset
+    correct(s, s.error_e, s.w_y, k_i, interval_s, s.yaw_rate_e)
     s.yaw_left_s = interval_s
 
 

@@ -21,8 +21,8 @@ def call_roll_pitch(state, dv_e_m_s):
 
 
 @gps_velocity.kernel
-def call_correct(state, error_e, weight, interval_s):
-    gps_velocity.correct(state[0], error_e, weight, interval_s, state[0].tilt_rate_e)
+def call_correct(state, error_e, weight, k_i, interval_s):
+    gps_velocity.correct(state[0], error_e, weight, k_i, interval_s, state[0].tilt_rate_e)
 
 
 @gps_velocity.kernel
@@ -80,7 +80,7 @@ def test_error_of_eqn_4_is_the_cross_product_of_both_sides():
 
 
 def test_error_in_free_fall_between_two_reports_is_zero():
-    """Nothing is felt, and the velocity grows by gravity: both sides of Eqn 3 vanish, and nothing is divided by them."""
+    """Nothing is felt, and the velocity grows by gravity: both sides of Eqn 3 vanish, and divide nothing."""
     state = at_fix(Rotation.from_euler("x", 0.4).as_matrix(), np.zeros(3))
     call_roll_pitch(state, np.array([0.0, 0.0, 0.25 * G]))
     np.testing.assert_allclose(state["error_e"][0], 0.0, rtol=0, atol=ROUND_OFF)
@@ -91,10 +91,10 @@ def test_correct_is_eqns_5_28_and_29(seed):
     """Error seen from the body, weighted; the integral by K_I, the rate so that exp(-K_P W T) of the error is left."""
     rng = np.random.default_rng(seed)
     R_eg, R_gb = Rotation.random(2, rng=rng).as_matrix()
-    state = GpsVelocity(GpsVelocityParams(k_p=0.8, k_i=0.05)).snapshot()
+    state = GpsVelocity(GpsVelocityParams(k_p=0.8)).snapshot()
     state["R_eg"][0], state["R_gb"][0] = R_eg, R_gb
     error_e, interval_s, weight = rng.normal(0.0, 0.02, 3), 0.5, 0.6
-    call_correct(state, error_e, weight, interval_s)
+    call_correct(state, error_e, weight, 0.05, interval_s)
     error_b = (R_eg @ R_gb).T @ error_e  # Eqn 5
     oracle = 0.05 * interval_s * weight * error_b
     np.testing.assert_allclose(state["omega_i_b"][0], oracle, rtol=0, atol=ROUND_OFF)
@@ -103,17 +103,21 @@ def test_correct_is_eqns_5_28_and_29(seed):
     np.testing.assert_allclose(left, math.exp(-0.8 * weight * interval_s) * error_e, rtol=0, atol=ROUND_OFF)
 
 
-def test_sum_of_eqn_3_is_the_integral_of_the_turned_accelerometer():
-    """A constant rate and a constant force in the body: the closed form of the integral, half a degree a tick."""
-    dt_s, rate = 0.01, np.array([0.5, -0.8, 0.6])
+@pytest.mark.parametrize("rate", [(0.0, 0.0, 1.1), (1.1, 0.0, 0.0), (0.0, -1.1, 0.0)])
+def test_sum_of_eqn_3_is_the_integral_of_the_turned_accelerometer(rate):
+    """A constant force in a body that turns about one axis: the closed form of the integral, half a degree a tick."""
+    dt_s, duration_s = 0.01, 2.0
     estimator = GpsVelocity(lagless())
-    estimator.replay(tumbling(2.0, dt_s))
+    estimator.replay(tumbling(duration_s, dt_s, rate))
     accelerometer = np.array([-1.0, 2.0, 9.0])  # Eqn 1: gravity minus acceleration
     times = (np.arange(20000) + 0.5) * 1e-4
     oracle = 1e-4 * Rotation.from_rotvec(times[:, None] * rate).apply(accelerometer).sum(axis=0)
     felt = estimator.snapshot()["felt_g_m_s"][0]
-    # A 24th of (rate dt)^2 = 1.3e-4 a tick for the mean within it, and Eqn 17's theta^3 / 3 a tick in the attitude.
-    np.testing.assert_allclose(felt, oracle, rtol=0, atol=2.0 * 9.3 * (1.3e-4 / 24 + 200 * 0.0112**3 / 3))
+    # Half a tick by a straight line: (theta / 2)^2 / 2 of the force; Eqn 17: an angle of theta^3 / 3 a tick.
+    # (Leaving that half tick out would leave theta / 2 = 0.0055 of the force, 0.1 m/s.)
+    theta = 1.1 * dt_s
+    atol = 9.3 * duration_s * (theta**2 / 8 + 0.5 * duration_s / dt_s * theta**3 / 3)
+    np.testing.assert_allclose(felt, oracle, rtol=0, atol=atol)
 
 
 def test_memory_is_filtered_as_the_receiver_filters_and_recalled_a_latency_ago():

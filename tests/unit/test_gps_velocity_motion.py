@@ -47,7 +47,7 @@ def turning(duration_s, bank_deg=35.0, heading_0=0.4, wind=0.0, gps_hz=4):
 
 
 def surging(duration_s, heading=0.7, swing_m_s=4.0, hz=0.1):
-    """Rows of level flight whose speed swings: 2.5 m/s^2 along the nose, which an accelerometer takes for 14 degrees."""
+    """Rows of level flight whose speed swings: 2.5 m/s^2 along the nose, 14 degrees to an accelerometer."""
     rows = rows_of(duration_s)
     w, nose = 2.0 * math.pi * hz, np.exp(1j * heading)
     # Mean acceleration of a tick; report: gain 1 / |1 + i w T|, phase atan(w T), a latency ago.
@@ -77,7 +77,7 @@ def test_coordinated_turn_keeps_the_attitude(gps_hz):
 
 
 def test_coordinated_turn_with_an_unmatched_lag_tilts():
-    """A second of filter and 0.3 s of latency that nobody knows of: degrees of tilt, so the test above is no accident."""
+    """A second of filter and 0.3 s of latency that nobody knows of: degrees of tilt; the test above is no accident."""
     rows, R = turning(120.0)
     estimates = power_up(R[0], k_i=0.0, gps_filter_s=0.0, gps_latency_s=0.0).replay(rows)
     assert np.degrees(inclination_error_rad(estimates["R_eb"], R))[-500:].max() > 2.0
@@ -110,7 +110,7 @@ def test_surge_along_the_nose_is_no_tilt():
 
 
 def test_surge_before_yaw_is_locked_the_stand_in_is_gated():
-    """A push along an unknown heading: 3 g for 0.3 s, then level flight, turns the matrix over by less than 3 degrees."""
+    """A push along an unknown heading: 3 g for 0.3 s, then level flight, tips the matrix by less than 3 degrees."""
     rows = rows_of(6.0)
     t, push, throw_s = rows["t_s"], 27.0, 0.3
     thrown = (t > 2.0 + 1e-9) & (t <= 2.0 + throw_s + 1e-9)
@@ -177,7 +177,7 @@ def test_magnetometer_turns_the_nose_to_true_north(declination_deg):
     field_e = [20.0 * math.cos(declination), 20.0 * math.sin(declination), 40.0]
     rows["mag_b_ut"] = np.einsum("nji,j->ni", R, field_e)
     rows["mag_new"][::5] = 1
-    estimator = power_up(R[0], yaw_reference="magnetometer", declination_rad=declination)
+    estimator = power_up(R[0], yaw_reference="magnetometer", declination_rad=declination, k_i=0.0)
     assert estimator.heading_reference == "nose"
     estimates = estimator.replay(rows)
     assert np.degrees(np.abs(heading_error_rad(estimates["R_eb"], R)))[-250:].max() < 0.5
