@@ -25,11 +25,11 @@ from estimator.jit import kernel
 
 WIND_BEFORE_M_S = 4.0  # wind per axis that is expected before anything is known of it
 AIRSPEED_BEFORE_M_S = 30.0  # size of c, likewise
-WIND_WALK = 0.05  # how quickly the wind changes, m/s per root second
-AIRSPEED_WALK = 0.4  # how quickly airspeed, and its direction against the gyros' nose, do
+WIND_WALK = 0.06  # how quickly the wind changes, m/s per root second
+AIRSPEED_WALK = 0.6  # how quickly airspeed, and its direction against the gyros' nose, do
 RESIDUAL_M_S = 1.0  # sideslip, angle of attack, gusts: what one second of fixes is off by
 SURPRISE = 16.0  # squared innovation over its variance beyond which a fix is not believed
-KNOWN_M_S = 1.2  # the wind is known once its standard deviation is below
+KNOWN_M_S = 0.9  # the wind is known once its standard deviation is below
 FORGET_S = 4.0  # how long surprises must go on until the airspeed is learnt anew
 SHORTEST_NOSE = 0.5  # a filtered nose shorter than this was in a loop or a spin
 
