@@ -220,3 +220,22 @@ def test_heading_reference_follows_from_the_yaw_reference():
     assert references == {"course": "course", "nose": "nose"}
     assert GpsVelocityMagnetometer().heading_reference == "nose"
     assert "magnetometer" in GpsVelocityMagnetometer.uses
+
+
+@pytest.mark.parametrize("reference", gps_velocity.YAW_REFERENCES)
+def test_rubbish_of_all_kinds_never_leaves_the_rotations(reference):
+    """Spikes, NaN, gaps, clocks set back and absurd reports, for 100 s: still a rotation within 1e-3, still finite."""
+    rng = np.random.default_rng(11)
+    rows = rows_of(100.0)
+    rows["dt_s"] = rng.choice([0.0, 1e-6, 0.02, 0.5, 3.0, np.nan], len(rows))
+    rows["t_s"] += rng.choice([0.0, -5.0, 0.4, np.inf], len(rows), p=[0.97, 0.01, 0.01, 0.01])
+    for name in ("gyro_b_rad_s", "force_b_m_s2", "gps_v_e_m_s", "mag_b_ut"):
+        scale = rng.choice([0.0, 1.0, 30.0, 900.0, 1e30, np.nan], (len(rows), 1))
+        rows[name] = scale * rng.standard_normal((len(rows), 3))
+    rows["gps_new"], rows["mag_new"] = rng.integers(0, 2, (2, len(rows)))
+    estimates = GpsVelocity(GpsVelocityParams(yaw_reference=reference, w_y=20.0, w_rp=20.0)).replay(rows)
+    R = estimates["R_eb"]
+    assert np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max() < 1e-3
+    assert np.linalg.det(R).min() > 0.0
+    assert np.all(np.isfinite(estimates["omega_b_rad_s"]))
+    assert np.all(np.isfinite(estimates["gyro_bias_b_rad_s"]))
