@@ -46,6 +46,9 @@ ESTIMATORS: dict[str, str] = {
     "matrixpilot": "estimator.matrixpilot:MatrixPilot",
     "ap_dcm": "estimator.ap_dcm:ApDcm",
     "ap_dcm_2013": "estimator.ap_dcm:ApDcm2013",
+    "gps_velocity": "estimator.gps_velocity:GpsVelocity",
+    "gps_velocity_nose": "estimator.gps_velocity:GpsVelocityNose",
+    "gps_velocity_magnetometer": "estimator.gps_velocity:GpsVelocityMagnetometer",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
 }

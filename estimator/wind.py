@@ -19,19 +19,18 @@ References
 W. Premerlani, "IMU wind estimation (theory)", 2009 (the two-fix form).
 """
 
-import numpy as np
-
 from estimator.compiled import WIND
 from estimator.interface import Column
 from estimator.jit import kernel
 
 WIND_BEFORE_M_S = 4.0  # wind per axis that is expected before anything is known of it
 AIRSPEED_BEFORE_M_S = 30.0  # size of c, likewise
-WIND_WALK = 0.05  # how quickly the wind changes, m/s per root second
-AIRSPEED_WALK = 0.4  # how quickly airspeed, and its direction against the gyros' nose, do
+WIND_WALK = 0.06  # how quickly the wind changes, m/s per root second
+AIRSPEED_WALK = 0.6  # how quickly airspeed, and its direction against the gyros' nose, do
 RESIDUAL_M_S = 1.0  # sideslip, angle of attack, gusts: what one second of fixes is off by
 SURPRISE = 16.0  # squared innovation over its variance beyond which a fix is not believed
-KNOWN_M_S = 1.2  # the wind is known once its standard deviation is below
+KNOWN_M_S = 0.9  # the wind is known once its standard deviation is below
+FORGET_S = 4.0  # how long surprises must go on until the airspeed is learnt anew
 SHORTEST_NOSE = 0.5  # a filtered nose shorter than this was in a loop or a spin
 
 WIND_FILTER = (
@@ -72,7 +71,10 @@ def learn_wind(s, nose_north, nose_east, v_north_m_s, v_east_m_s, dt_s):  # type
     residual = RESIDUAL_M_S**2 / min(max(dt_s, 1e-3), 1.0)
     w_e, c_e = ww + wc * f.conjugate(), wc.conjugate() + cc * f.conjugate()  # covariances with e
     variance = (w_e + c_e * f).real + residual
-    believed = abs(f) >= SHORTEST_NOSE and abs(e) ** 2 <= SURPRISE * variance
+    clear = abs(f) >= SHORTEST_NOSE
+    believed = clear and abs(e) ** 2 <= SURPRISE * variance
+    if clear and not believed:  # if this goes on, airspeed or the gyros' heading are no longer what they were
+        cc = min(cc + abs(e) ** 2 * min(dt_s / FORGET_S, 1.0), AIRSPEED_BEFORE_M_S**2)
     if believed:
         w, c = w + w_e * e / variance, c + c_e * e / variance
         ww -= abs(w_e) ** 2 / variance
