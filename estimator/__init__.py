@@ -43,6 +43,7 @@ from typing import TypeVar
 
 ESTIMATORS: dict[str, str] = {
     "premerlani": "estimator.premerlani:Premerlani",
+    "ins_ekf": "estimator.ins_ekf:InsEkf",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
 }
