@@ -90,12 +90,11 @@ FIX_LIFE_S = 2.0  # without a fix for longer, the velocity is believed to stay
 RESTART_S = 3.0  # fixes refused for longer: start again
 SLOWEST_AIRSPEED_M_S = 5.0  # slower, sideslip says nothing
 CRUISE_S = 5.0  # time constant of the remembered airspeed
-HELD_SPEED_M_S, UNSURE_SPEED_M_S, SILENT_SPEED_M_S = 0.5, 20.0, 3.0  # sigmas of a speed: at rest, in the air, remembered
+HELD_SPEED_M_S, SILENT_SPEED_M_S = 0.5, 3.0  # sigmas of a speed: at rest, remembered
 HELD_M_S2 = 0.5  # sigma of the acceleration of something standing or held
 START_TILT_RAD, RESTART_TILT_RAD = math.radians(15.0), 0.7
-SEED_SPEED_M_S = 3.0  # how far the receiver's filter may be behind at the first fix
-COURSE_RAD, MATCH_RAD = 0.6, 1.0  # sigma of a heading from the course; that before a match, which the fix replaces
-MATCHED = 0.3  # a velocity known to this share of the fix is matched with it
+STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the start
+MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
 WIND_KNOWN_M_S = 2.0  # sigma, both axes together, of a wind worth telling
 GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigmas of a good attitude
 CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR = 1, 2, 4, 8, 16  # bits of a waiting sample
@@ -216,6 +215,7 @@ _AROUND = (
     Column("cruise_m_s", (), "airspeed of late, for when the GPS falls silent"),
     Column("cruise_sigma_m_s", (), "how well it is known"),
     Column("lift_e_m_s2", (), "mean downward specific force of late: minus gravity, in any flight"),
+    Column("nose_at_start", (2,), "horizontal nose where the filter started"),
     Column("oldest", (), "index of the oldest waiting sample", integer=True),
     Column("waiting", (), "how many wait", integer=True),
     Column("w_clock_s", (SIZE,), "when each waiting sample ended"),
@@ -322,11 +322,15 @@ def forget(P, first, count, sigma):  # type: ignore[no-untyped-def]
 def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     """Begin anew from attitude, biases and wind as they are; velocity zero, of the `speed_sigma_m_s` given."""
     forget(s.P, TILT, 3, tilt_sigma_rad)
-    forget(s.P, VEL, 3, speed_sigma_m_s)
     forget(s.P, BIAS, 3, s.gyro_bias_sigma_rad_s)
     forget(s.P, GAIN, 3, s.gyro_gain_sigma)
     forget(s.P, FORCE, 3, s.force_bias_sigma_m_s2)
     forget(s.P, LAG, 3, speed_sigma_m_s)
+    forget(s.P, VEL, 3, np.hypot(speed_sigma_m_s, STEADY_M_S))
+    for i in range(3):  # a receiver in steady motion holds the velocity there is
+        s.P[VEL + i, LAG + i] = s.P[LAG + i, VEL + i] = speed_sigma_m_s**2
+    length = max(np.hypot(s.R_filter_eb[0, 0], s.R_filter_eb[1, 0]), 1e-3)
+    s.nose_at_start[0], s.nose_at_start[1] = s.R_filter_eb[0, 0] / length, s.R_filter_eb[1, 0] / length
     forget(s.P, WIND_NE, 2, s.wind_sigma_m_s)
     for i in range(3):
         s.v_e_m_s[i] = s.lagged_v_e_m_s[i] = s.lagged_rate_m_s2[i] = s.wind_e_m_s[i] = 0.0
@@ -359,7 +363,7 @@ def start_at_rest(state, force):  # type: ignore[no-untyped-def]
 @kernel
 def start_in_air(state):  # type: ignore[no-untyped-def]
     """Begin in flight: nothing known but that it is roughly level."""
-    start(state[0], START_TILT_RAD, UNSURE_SPEED_M_S)
+    start(state[0], START_TILT_RAD, state[0].wind_sigma_m_s)
 
 
 @kernel
@@ -397,18 +401,24 @@ def doubt_heading(s, sigma_rad):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def begin_with_fix(s, z, speed, fast):  # type: ignore[no-untyped-def]
-    """Take velocity, and where it is `fast` heading, from the fix `z`, shape (3,)."""
-    for i in range(3):
-        s.v_e_m_s[i] = s.lagged_v_e_m_s[i] = z[i]
-    forget(s.P, VEL, 3, SEED_SPEED_M_S)
-    forget(s.P, LAG, 3, s.gps_noise_m_s)
-    s.seeded = 1
+def begin_with_fix(s, z, fast):  # type: ignore[no-untyped-def]
+    """Take the velocity at the start, along the nose there, from the first fix `z`, shape (3,).
+
+    What has happened since the start is believed: the receiver would now hold y, had the start been at rest, and
+    holds y + V nose. V is the speed with which that is as long as the fix; its direction is matched afterwards.
+    """
+    if s.fix_age_s > FIX_LIFE_S:  # the start is long past: it shall be now
+        start(s, max(START_TILT_RAD, np.sqrt(s.P[TILT, TILT])), s.wind_sigma_m_s)
+    y, n = s.lagged_v_e_m_s, s.nose_at_start
+    speed = 0.0
     if fast:
-        R = s.R_filter_eb
-        turn_in_earth(R, 0.0, 0.0, np.arctan2(z[1], z[0]) - np.arctan2(R[1, 0], R[0, 0]))
-        forget(s.P, TILT + 2, 1, COURSE_RAD)
-        s.aligned = 1
+        along = n[0] * y[0] + n[1] * y[1]
+        root = along * along + z[0] * z[0] + z[1] * z[1] - y[0] * y[0] - y[1] * y[1]
+        speed = np.sqrt(max(root, 0.0)) - along
+    for i in range(2):
+        s.v_e_m_s[i] += speed * n[i]
+        y[i] += speed * n[i]
+    s.seeded = 1
 
 
 # What is measured
@@ -423,23 +433,21 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
     speed = np.hypot(z[0], z[1])
     fast = speed >= s.min_speed_m_s
     if not s.seeded:
-        begin_with_fix(s, z, speed, fast)
-        s.fix_age_s = s.refusing_s = 0.0
-        return
+        begin_with_fix(s, z, fast)
     turning = 0.0  # sigma of a horizontal velocity that has no direction yet
-    if not s.aligned:
+    if not s.aligned and not fast:
+        turning = speed
+    elif not s.aligned:
         y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
-        unsure = s.P[LAG, LAG] + s.P[LAG + 1, LAG + 1]
-        if not fast:
-            turning = speed
-        elif unsure < (MATCHED * speed) ** 2 and np.hypot(y0, y1) > 0.5 * s.min_speed_m_s:
-            turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
-            doubt_heading(s, MATCH_RAD)
-            s.aligned = 1
-        elif unsure >= (MATCHED * speed) ** 2:
-            begin_with_fix(s, z, speed, fast)
-        else:
+        if s.P[LAG, LAG] + s.P[LAG + 1, LAG + 1] > max(speed, s.wind_sigma_m_s * 1.5) ** 2:
+            s.seeded = 0  # drifted too far to be matched: begin again with the next fix
+            s.fix_age_s = math.inf
+            return
+        if np.hypot(y0, y1) < 0.5 * s.min_speed_m_s:
             return  # moving, and not yet known to be
+        turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
+        doubt_heading(s, MATCH_RAD)
+        s.aligned = 1
     believed = 0
     for j in range(3):
         no_gradient(s.h)
@@ -462,7 +470,8 @@ def restart(s):  # type: ignore[no-untyped-def]
     """Begin again in the air, from the attitude there is, or level where that has been upside down for seconds."""
     if s.lift_e_m_s2 > 0.0:
         level(s.R_filter_eb)
-    start(s, RESTART_TILT_RAD, UNSURE_SPEED_M_S)
+    start(s, RESTART_TILT_RAD, s.wind_sigma_m_s)
+    s.fix_age_s = 0.0
 
 
 @kernel
@@ -550,7 +559,7 @@ def keep_sane(s):  # type: ignore[no-untyped-def]
     if not (whole and total < 1e9):
         for i in range(3):
             s.gyro_bias_b_rad_s[i] = s.gyro_gain[i] = s.force_bias_b_m_s2[i] = 0.0
-        start(s, RESTART_TILT_RAD, UNSURE_SPEED_M_S)
+        start(s, RESTART_TILT_RAD, s.wind_sigma_m_s)
         s.rejected += 1
 
 
