@@ -94,6 +94,7 @@ HELD_SPEED_M_S, SILENT_SPEED_M_S = 0.5, 3.0  # sigmas of a speed: at rest, remem
 HELD_M_S2 = 0.5  # sigma of the acceleration of something standing or held
 START_TILT_RAD, RESTART_TILT_RAD = math.radians(15.0), 0.7
 STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the start
+FRAME_RAD = 0.01  # sigma of the heading before a match: none, in a frame of its own
 MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
 WIND_KNOWN_M_S = 2.0  # sigma, both axes together, of a wind worth telling
 GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigmas of a good attitude
@@ -322,6 +323,7 @@ def forget(P, first, count, sigma):  # type: ignore[no-untyped-def]
 def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     """Begin anew from attitude, biases and wind as they are; velocity zero, of the `speed_sigma_m_s` given."""
     forget(s.P, TILT, 3, tilt_sigma_rad)
+    forget(s.P, TILT + 2, 1, FRAME_RAD)
     forget(s.P, BIAS, 3, s.gyro_bias_sigma_rad_s)
     forget(s.P, GAIN, 3, s.gyro_gain_sigma)
     forget(s.P, FORCE, 3, s.force_bias_sigma_m_s2)

@@ -259,7 +259,9 @@ def correct_state(s, innovation):  # type: ignore[no-untyped-def]
     for i in range(3):
         s.v_e_m_s[i] += k[VEL + i] * innovation
         s.lagged_v_e_m_s[i] += k[LAG + i] * innovation
-        s.gyro_bias_b_rad_s[i] = within(s.gyro_bias_b_rad_s[i] + k[BIAS + i] * innovation, 2.0 * s.gyro_bias_sigma_rad_s)
+        s.gyro_bias_b_rad_s[i] = within(
+            s.gyro_bias_b_rad_s[i] + k[BIAS + i] * innovation, 2.0 * s.gyro_bias_sigma_rad_s
+        )
         s.gyro_gain[i] = within(s.gyro_gain[i] + k[GAIN + i] * innovation, s.gyro_gain_sigma)
         s.force_bias_b_m_s2[i] = within(s.force_bias_b_m_s2[i] + k[FORCE + i] * innovation, s.force_bias_sigma_m_s2)
     for i in range(2):
