@@ -76,7 +76,7 @@ def test_weaving_kinematics_are_consistent():
 
 
 def fly(seed, params=None):
-    """Normalised errors of one flight at the filter's own time, (n, k) each, and the true errors; from `SETTLED_S` on."""
+    """Errors and sigmas of one flight at the filter's own time, (n, 2, axes) each, from `SETTLED_S` on."""
     rng = np.random.default_rng(seed)
     rates = Rates(gps_hz=4)
     log = Log.empty(rates.ticks(DURATION_S))

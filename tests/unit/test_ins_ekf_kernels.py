@@ -122,7 +122,7 @@ def test_advance_state_equals_scipy_and_the_filter_of_the_receiver():
     R0, turn = Rotation.from_matrix(s["R_filter_eb"]), Rotation.from_rotvec
     np.testing.assert_allclose(a["R_filter_eb"], (R0 * turn(rate * dt_s)).as_matrix(), rtol=0, atol=1e-12)
     force_e = (R0 * turn(0.5 * rate * dt_s)).apply(FORCE_B - s["force_bias_b_m_s2"])
-    v1 = s["v_e_m_s"] + dt_s * (force_e + [0.0, 0.0, 9.80665])
+    v1 = s["v_e_m_s"] + dt_s * (force_e + np.array([0.0, 0.0, 9.80665]))
     np.testing.assert_allclose(a["v_e_m_s"], v1, rtol=0, atol=1e-12)
     y, n = s["lagged_v_e_m_s"].copy(), 20000
     for k in range(n):  # trapezium rule, error (dt / n)^2
