@@ -113,7 +113,7 @@ class InsEkfParams:
     gps_lag_sigma_s : float             how well filter and latency are known; inflates a fix while turning
     wind_sigma_m_s : float              of each horizontal component of the wind
     wind_walk_m_s_sqrt_s : float        the wind walks, sigma after one second
-    sideslip_sigma_rad : float          of one pseudo-measurement of no sideslip, one every 0.2 s
+    sideslip_sigma_m_s : float          of the velocity along the wing, by slip and gusts, every 0.2 s
     use_airspeed : bool                 believe air data where they come
     airspeed_noise_m_s : float          sigma of an airspeed
     use_magnetometer : bool             believe the magnetometer's heading where it comes (calibrated, that is)
@@ -140,7 +140,7 @@ class InsEkfParams:
     gps_lag_sigma_s: float = 0.02
     wind_sigma_m_s: float = 4.0
     wind_walk_m_s_sqrt_s: float = 0.1
-    sideslip_sigma_rad: float = math.radians(6.0)
+    sideslip_sigma_m_s: float = 1.4
     use_airspeed: bool = True
     airspeed_noise_m_s: float = 1.0
     use_magnetometer: bool = False

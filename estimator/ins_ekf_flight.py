@@ -245,7 +245,7 @@ def take_pseudo(s):  # type: ignore[no-untyped-def]
             s.cruise_m_s += (along - s.cruise_m_s) * (PSEUDO_S / CRUISE_S if s.cruise_m_s > 0.0 else 1.0)
             s.cruise_sigma_m_s = SILENT_SPEED_M_S
         across = through_air(s, 1)
-        fuse(s, -across, (s.sideslip_sigma_rad * along) ** 2, s.gate)
+        fuse(s, -across, s.sideslip_sigma_m_s**2, s.gate)
     if silent:
         for axis in range(3):
             aim = s.cruise_m_s if axis == 0 else 0.0
