@@ -126,7 +126,7 @@ def test_normalised_error_monte_carlo_is_near_one(flights, quantity):
 def test_errors_monte_carlo_are_small(flights):
     """A filter that is consistent because it knows nothing would be no use; limits are twice what is measured."""
     rms = {name: float(np.sqrt(np.mean(np.sum(pairs[:, :, 0] ** 2, axis=-1)))) for name, pairs in flights.items()}
-    assert math.degrees(rms["tilt"]) <= 1.4  # 0.70
-    assert math.degrees(rms["heading"]) <= 3.2  # 1.59
-    assert rms["velocity"] <= 0.3  # 0.14
-    assert rms["wind"] <= 0.8  # 0.41
+    assert math.degrees(rms["tilt"]) <= 1.4  # 0.78
+    assert math.degrees(rms["heading"]) <= 3.2  # 1.69
+    assert rms["velocity"] <= 0.3  # 0.15
+    assert rms["wind"] <= 0.8  # 0.44
