@@ -49,6 +49,7 @@ ESTIMATORS: dict[str, str] = {
     "gps_velocity": "estimator.gps_velocity:GpsVelocity",
     "gps_velocity_nose": "estimator.gps_velocity:GpsVelocityNose",
     "gps_velocity_magnetometer": "estimator.gps_velocity:GpsVelocityMagnetometer",
+    "ins_ekf": "estimator.ins_ekf:InsEkf",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
 }
