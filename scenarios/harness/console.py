@@ -95,12 +95,21 @@ def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Table"
     return grid
 
 
-def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = (0,)) -> "Table":
-    """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty."""
+def table(
+    title: str,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    text: Sequence[int] = (0,),
+    wrapping: Sequence[int] = (),
+) -> "Table":
+    """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty.
+
+    Columns of `wrapping` give way where the table is too wide.
+    """
     grid = _table(title)
     grid.show_header = any(headings)
     for i, heading in enumerate(headings):
-        grid.add_column(heading, justify="left" if i in text else "right", no_wrap=True)
+        grid.add_column(heading, justify="left" if i in text else "right", no_wrap=i not in wrapping)
     for row in rows:
         grid.add_row(*row)
     return grid

@@ -8,12 +8,13 @@ from typing import Any
 from estimator.interface import AttitudeEstimator
 from scenarios.harness.air_config import build_air
 from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, override, resolve
-from scenarios.harness.fitted import changed, suite_params
+from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator
 from scenarios.harness.scenario import Scenario
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Flight, Log
 from sim.loop import Watch, fly
+from sim.params import changed
 from sim.plant import HandThrow, InFlight, Start
 from sim.sensors.suite import Suite
 
@@ -62,7 +63,7 @@ def fly_config(
     """
     config = resolve(config)
     rates = config.rates.build()
-    suite = Suite(suite_params(config.suite, config.sensors), rates, config.seed, config.flight)
+    suite = Suite(suite_params(config.suite, config.sensors, config.files), rates, config.seed, config.flight)
     estimator = maker() if maker is not None else _estimator(config)
     pilot = load_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft)
     script = scenario.script(config)
