@@ -43,6 +43,8 @@ from typing import TypeVar
 
 ESTIMATORS: dict[str, str] = {
     "premerlani": "estimator.premerlani:Premerlani",
+    "starlino": "estimator.starlino:Starlino",
+    "dilshad": "estimator.dilshad:Dilshad",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
 }
