@@ -59,6 +59,7 @@ from estimator.screening import (
     take_rate,
 )
 
+ZERO = (0.0, 0.0, 0.0)
 SMALL_RAD = 0.1  # "small": larger rotations are applied in parts
 SHORTEST_WEST = 0.02  # sine of the angle between field and vertical below which there is no north
 NED_FROM_NWU = np.diag([1.0, -1.0, -1.0])
@@ -104,13 +105,15 @@ class StarlinoParams:
 
 
 _RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
-_OF_PARAMS = ("s_g", "s_a", "s_m", "band", "magnetometer", "declination_rad")
+_OF_PARAMS = ("s_g", "s_a", "s_m", "band", "magnetometer")
 STATE_DTYPE = dtype_of(
     (
         *BELIEF,
         *SCREEN,
         *FIELD,
         *(Column(name, (), "see StarlinoParams", integer=name == "magnetometer") for name in _OF_PARAMS),
+        Column("cos_declination", (), "of magnetic from true north"),
+        Column("sin_declination", (), "positive east"),
         Column("dcm", (3, 3), "rows I, J, K: north, west and zenith, seen from the body"),
     )
 )
@@ -137,7 +140,7 @@ def plus(a, factor, b):  # type: ignore[no-untyped-def]
 @kernel
 def normalize(a):  # type: ignore[no-untyped-def]
     """``a / |a|``."""
-    return plus((0.0, 0.0, 0.0), 1.0 / np.sqrt(dot(a, a)), a)
+    return plus(ZERO, 1.0 / np.sqrt(dot(a, a)), a)
 
 
 @kernel
@@ -155,14 +158,14 @@ def trust(length_m_s2, band):  # type: ignore[no-untyped-def]
 @kernel
 def north(A, s):  # type: ignore[no-untyped-def]
     """North: the field made horizontal by the zenith `A` (comments 16, 108), a unit vector; and whether it is known."""
-    M = normalize((s.field_b_ut[0], s.field_b_ut[1], s.field_b_ut[2]))
+    M = (s.field_b_ut[0], s.field_b_ut[1], s.field_b_ut[2])
     W = cross(A, M)
-    if not dot(W, W) > SHORTEST_WEST**2:  # so that a field of no length, NaN here, is none
+    horizontal2 = dot(W, W)
+    if not horizontal2 > SHORTEST_WEST**2 * dot(M, M):  # a field of no length is none either
         return A, False
-    W = normalize(W)
     N = cross(W, A)  # magnetic: true north lies to the west of it by the declination
-    d = s.declination_rad
-    return plus(plus((0.0, 0.0, 0.0), np.cos(d), N), np.sin(d), W), True
+    scale = 1.0 / np.sqrt(horizontal2)
+    return plus(plus(ZERO, scale * s.cos_declination, N), scale * s.sin_declination, W), True
 
 
 @kernel
@@ -189,7 +192,7 @@ def displacement(row, s, good):  # type: ignore[no-untyped-def]
                 m, s_m = cross(I0, N), part * s.s_m  # it leans on A, and is trusted as far as A is
                 j, k = j + s_m * dot(m, J0), k + s_m * dot(m, K0)
                 by_j, by_k = by_j + s_m, by_k + s_m
-    return plus(plus(plus((0.0, 0.0, 0.0), i / by_i, I0), j / by_j, J0), k / by_k, K0)
+    return plus(plus(plus(ZERO, i / by_i, I0), j / by_j, J0), k / by_k, K0)
 
 
 @kernel
@@ -205,10 +208,13 @@ def orthonormalise(a, b):  # type: ignore[no-untyped-def]
 @kernel
 def turn(dcm, d):  # type: ignore[no-untyped-def]
     """Turn the matrix by the small rotation `d` of the earth, in place, as many small parts as it takes."""
-    parts = 1 + int(np.sqrt(dot(d, d)) / SMALL_RAD)
+    parts = 1
+    if dot(d, d) > SMALL_RAD**2:
+        parts = 1 + int(np.sqrt(dot(d, d)) / SMALL_RAD)
+        d = plus(ZERO, 1.0 / parts, d)
     I1, J1 = axis(dcm, 0), axis(dcm, 1)
     for _ in range(parts):
-        I1, J1 = orthonormalise(plus(I1, 1.0 / parts, cross(d, I1)), plus(J1, 1.0 / parts, cross(d, J1)))
+        I1, J1 = orthonormalise(plus(I1, 1.0, cross(d, I1)), plus(J1, 1.0, cross(d, J1)))
     K1 = cross(I1, J1)
     for i in range(3):
         dcm[0, i], dcm[1, i], dcm[2, i] = I1[i], J1[i], K1[i]
@@ -265,6 +271,8 @@ class Starlino(Compiled):
             s[name] = getattr(self.params, name)
         for f in fields(Calibration):
             s[f.name] = getattr(self.params.calibration, f.name)
+        d = self.params.declination_rad
+        s["cos_declination"], s["sin_declination"] = math.cos(d), math.sin(d)
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         s["dcm"] = NED_FROM_NWU @ s["R_eb"]
         s["gyro_bias_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
