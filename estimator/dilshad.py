@@ -86,7 +86,7 @@ class DilshadParams:
     declination_rad : float    of magnetic from true north, positive east; the GPS finds what is missing
     gps_weight_s : float       time over which courses correct the magnetometer; inf: they do not
     gps_lag_s : float          age of a course from three positions: filter, latency and one interval
-    min_speed_m_s : float      slowest ground speed at which a course means anything
+    min_speed_m_s : float      slowest ground speed, the receiver's, at which a course means anything
     gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
     """
 
@@ -237,9 +237,10 @@ def take_course(row, s):  # type: ignore[no-untyped-def]
     near = second_s <= LONGEST_STEP_S and first_s <= LONGEST_STEP_S
     s.p_e_m[1, 0], s.p_e_m[1, 1], s.p_age_s[1] = s.p_e_m[0, 0], s.p_e_m[0, 1], s.p_age_s[0]
     s.p_e_m[0, 0], s.p_e_m[0, 1], s.p_age_s[0] = x, y, 0.0
-    speed = np.hypot(vx, vy)
     straight = abs(s.turned_rad) <= STRAIGHT_RAD and s.heading_age_s <= HEADING_LIFE_S
-    if not (near and straight and s.min_speed_m_s <= speed <= FASTEST_M_S):  # NaN is none of these
+    # Positions 0.2 s apart that are 0.3 m wrong make 1 m/s out of nothing; the receiver's own speed does not.
+    moving = s.min_speed_m_s <= row.gps_speed_m_s <= FASTEST_M_S and np.hypot(vx, vy) <= FASTEST_M_S  # NaN is not
+    if not (near and straight and moving):
         return
     course = np.arctan2(vy, vx) + s.turned_rad  # Eqn 9, and what has been turned since
     s.courses += 1
