@@ -24,8 +24,9 @@ in Eqn 2 and R_z(theta_z) in Eqn 3 are interchanged.)  Eqns 10 to 12 follow from
 arctangent of two arguments.  Yaw is the middle angle: roll and pitch are lost at east and west, and no yaw is beyond.
 
 *Eqns 5 and 6* turn by the angle about the y axis, right-handed; the paper's pitch (nose up, Eqn 11) is its negative.
-And roll and pitch must be angles in the paper's order, roll first: with those of the usual order (``roll =
-arctan(y / z)``) the heading of a body that is both rolled and pitched is wrong.
+And roll and pitch must be angles in that order, roll first: with those of the usual order (``roll = arctan(y / z)``)
+the heading of a body that is both rolled and pitched is wrong.  With roll first, Eqn 7 is the heading square to the
+wings, off the nose's by about roll times pitch: it is compared with that of the estimate, not with its nose.
 
 *Eqns 7 and 9.*  ``arctan(Y / X)`` takes south for north; read the arctangent of two arguments.
 
@@ -152,7 +153,7 @@ STATE_DTYPE = dtype_of(
 
 @kernel
 def heading_of_field(m, f):  # type: ignore[no-untyped-def]
-    """Magnetic heading of the nose, from north over east (Eqns 5 to 7); NaN where there is none.
+    """Magnetic heading square to the wings, from north over east (Eqns 5 to 7); NaN where there is none.
 
     Parameters
     ----------
@@ -183,8 +184,8 @@ def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
 
 @kernel
 def set_heading(R_eb, heading_rad):  # type: ignore[no-untyped-def]
-    """Turn the matrix about the vertical, in place, until the nose has this heading."""
-    by = heading_rad - np.arctan2(R_eb[1, 0], R_eb[0, 0])
+    """Turn the matrix about the vertical, in place, until this heading is square to the wings, as Eqn 7's is."""
+    by = heading_rad - np.arctan2(-R_eb[0, 1], R_eb[1, 1])
     c, z = np.cos(by), np.sin(by)
     for j in range(3):
         x, y = R_eb[0, j], R_eb[1, j]
@@ -193,7 +194,7 @@ def set_heading(R_eb, heading_rad):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_heading(row, s, good):  # type: ignore[no-untyped-def]
-    """Every 125 ms, see how far the nose has drifted from the magnetometer's heading; the first one sets it."""
+    """Every 125 ms, see how far the yaw has drifted from the magnetometer's heading; the first one sets it."""
     s.heading_age_s += s.dt_s
     s.heading_due_s = min(s.heading_due_s + s.dt_s, 2.0 * s.yaw_every_s)
     if s.heading_age_s > HEADING_LIFE_S:
@@ -211,9 +212,10 @@ def take_heading(row, s, good):  # type: ignore[no-untyped-def]
         s.aligned = 1
         set_heading(s.R_eb, heading)
     hx, hy = np.cos(heading), np.sin(heading)
-    s.drift = s.R_eb[0, 0] * hy - s.R_eb[1, 0] * hx  # Premerlani's Eqn 23
-    if s.R_eb[0, 0] * hx + s.R_eb[1, 0] * hy < 0.0:
-        s.drift = np.copysign(np.hypot(s.R_eb[0, 0], s.R_eb[1, 0]), s.drift)
+    x, y = s.R_eb[1, 1], -s.R_eb[0, 1]  # square to the wings
+    s.drift = x * hy - y * hx  # Premerlani's Eqn 23
+    if x * hx + y * hy < 0.0:
+        s.drift = np.copysign(np.hypot(x, y), s.drift)
 
 
 @kernel
