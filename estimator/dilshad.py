@@ -8,7 +8,10 @@ All errors go through one PI controller (Premerlani's Eqns 28-29).  Iron: `estim
 The tilt of Eqns 5 and 6 is the accelerometer's.  That is right for a craft that stands or hovers in the mean.  In a
 coordinated turn the accelerometer feels no bank at all: the vertical part of the field then passes for a horizontal
 one, and in the north of America, where it is two and a half times the horizontal, the heading is off by more than the
-bank.  The course is a heading only for what flies along its nose, an aeroplane in still air.  Neither is mended here.
+bank.  It is what pilots of compasses know as the northerly turning error: banked to the right on a northerly heading,
+the compass shows a turn to the left, and an autopilot that steers by it banks further.  In straight flight in a
+crosswind that alone makes 80 degrees of heading error of 9.  The course, too, is a heading only for what flies along
+its nose, an aeroplane in still air.  Neither is mended here: it is the paper's estimator, and one for multi-rotors.
 
 Axes
 ----

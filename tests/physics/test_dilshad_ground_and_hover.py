@@ -1,8 +1,8 @@
 """The static test on the ground and the hover test of Dilshad and Jahan (section V), on prescribed motion.
 
 The sensors are those of the paper (ITG-3200, BMA180, HMC5843, LS20031 at 5 Hz), with all their errors, 10 minutes each.
-The paper's text gives times and words, no amplitudes.  Here: ranges over the seeds 0 to 2, after the first minute; sd is
-the standard deviation of an angle's error.
+The paper's text gives times and words, no amplitudes.  Here: ranges over the seeds 0 to 2, after the first minute; sd
+is the standard deviation of an angle's error.
 
     quantity                      the paper                                  here
     ----------------------------- ------------------------------------------ ---------------------------------------
