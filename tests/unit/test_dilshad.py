@@ -139,7 +139,7 @@ def test_heading_of_field_is_square_to_the_wings_and_not_along_the_nose(roll, pi
 
 
 def test_eqn_5_as_printed_with_the_pitch_of_eqn_11_is_wrong():
-    """Nose up by 20 degrees, heading 30: with the paper's pitch 163 degrees off; with its negative right."""
+    """Nose up by 20 degrees, heading 30: with the paper's pitch 59 degrees off, with its negative right."""
     theta, heading = math.radians(20.0), math.radians(30.0)
     R = Rotation.from_euler("ZYX", [heading, theta, 0.0]).as_matrix()
     field_flu = FLU @ R.T @ FIELD
@@ -149,7 +149,7 @@ def test_eqn_5_as_printed_with_the_pitch_of_eqn_11_is_wrong():
 
 
 def test_eqns_5_and_6_with_angles_of_the_usual_order_are_wrong_when_rolled_and_pitched():
-    """25 degrees of each: with ``roll = arctan(y / z)`` the heading is 6 degrees off, with the paper's order exact."""
+    """25 degrees of each: with ``roll = arctan(y / z)`` the heading is 9 degrees off, with the paper's order exact."""
     roll, p, heading = math.radians(25.0), math.radians(-25.0), math.radians(40.0)
     field_flu = Rotation.from_euler("ZXY", [-heading, roll, p]).inv().apply(FLU @ FIELD)
     up = Rotation.from_euler("ZXY", [-heading, roll, p]).inv().apply([0.0, 0.0, 1.0])
