@@ -10,8 +10,8 @@ coordinated turn the accelerometer feels no bank at all: the vertical part of th
 one, and in the north of America, where it is two and a half times the horizontal, the heading is off by more than the
 bank.  It is what pilots of compasses know as the northerly turning error: banked to the right on a northerly heading,
 the compass shows a turn to the left, and an autopilot that steers by it banks further.  In straight flight in a
-crosswind (the scenario, calibrated sensors, seeds 0-2) the heading error is 82 degrees with this tilt and 9 with that of
-the matrix.  And the course is a heading only for what flies along its nose, an aeroplane in still air.  Neither is
+crosswind (the scenario, calibrated sensors, seeds 0-2) the heading error is 82 degrees with this tilt and 9 with the
+matrix's.  And the course is a heading only for what flies along its nose, an aeroplane in still air.  Neither is
 mended here: it is the paper's estimator, and one for multi-rotors.
 
 Axes
