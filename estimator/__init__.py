@@ -50,6 +50,8 @@ ESTIMATORS: dict[str, str] = {
     "gps_velocity_nose": "estimator.gps_velocity:GpsVelocityNose",
     "gps_velocity_magnetometer": "estimator.gps_velocity:GpsVelocityMagnetometer",
     "ins_ekf": "estimator.ins_ekf:InsEkf",
+    "starlino": "estimator.starlino:Starlino",
+    "dilshad": "estimator.dilshad:Dilshad",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
 }
