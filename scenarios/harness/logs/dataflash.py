@@ -12,7 +12,7 @@ import struct
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from estimator.interface import Array
 from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import streams, tabular
 from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import Stream
+from scenarios.harness.logs.streams import Kind, Stream
 
 HEADER, FMT, FMT_LENGTH = b"\xa3\x95", 128, 89
 FIX_3D = 3.0  # GPS.Status
@@ -32,7 +32,7 @@ LABELS = {  # of UNIT -> factor to ours: angles stay in degrees, rates are in ra
 }  # fmt: skip
 GYRO, FORCE, FIELD = (tuple(f"{name}{axis}" for axis in "XYZ") for name in ("Gyr", "Acc", "Mag"))
 FIELDS = dict.fromkeys(FIELD, 0.1)  # factor to ours where the log tells no unit: milligauss; the others are in ours
-ATTITUDES: tuple[tuple[str, Literal["truth", "filter"]], ...] = (
+ATTITUDES: tuple[tuple[str, Kind], ...] = (
     ("SIM", "truth"),
     ("ATT", "filter"),
     ("AHR2", "filter"),

@@ -18,6 +18,7 @@ from scenarios.harness.logs import checks, tabular
 from scenarios.harness.logs.recorded import RecordedLog, Reference
 
 MISSED = 1.5  # a row so many intervals after the one before does not follow it: samples between were not logged
+Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
 _BY_NAME = ("gyro.x", "gyro.y", "gyro.z", "force.x", "force.y", "force.z")
 
 
@@ -41,7 +42,7 @@ class Messages:
     names : our names of the columns of `inertial` -> those of the log
     fixes : latitude, longitude (degrees), altitude, velocity north east down, time at which it was true
     field : magnetic, x y z, microtesla              airspeed, height : one column each
-    attitude : R_eb row by row, nine columns         kind : of the attitude, see `Reference`
+    attitude : R_eb row by row, nine columns         kind : of the attitude
     """
 
     inertial: Stream
@@ -52,7 +53,7 @@ class Messages:
     airspeed: Stream | None = None
     height: Stream | None = None
     attitude: Stream | None = None
-    kind: Literal["truth", "filter"] = "filter"
+    kind: Kind = "filter"
 
 
 def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:

@@ -9,7 +9,7 @@ import contextlib
 import io
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from estimator.interface import Array
 from scenarios.harness.logs import streams, tabular
 from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import Stream
+from scenarios.harness.logs.streams import Kind, Stream
 
-ATTITUDES: tuple[tuple[str, Literal["truth", "filter"]], ...] = (
+ATTITUDES: tuple[tuple[str, Kind], ...] = (
     ("vehicle_attitude_groundtruth", "truth"), ("vehicle_attitude", "filter"),
 )  # fmt: skip
 TOPICS = [
@@ -151,9 +151,8 @@ def _inertial(log: _Log, imu: int | None) -> tuple[Stream, Array, dict[str, str]
         if len(t_s) > 2 and (step := float(np.median(np.diff(t_s)))) > SLOWEST_S:
             raise LogError(f"{log.path}: {name} was logged every {step:g} s; {SLOWEST_S} s or less can be replayed")
     names = {"time": f"{name}.timestamp", "gyro": gyro, "force": force}
-    names |= {
-        f"{ours}.{a}": f"{own}[{i}]" for ours, own in (("gyro", gyro), ("force", force)) for i, a in enumerate("xyz")
-    }
+    for i, axis in enumerate("xyz"):
+        names |= {f"gyro.{axis}": f"{gyro}[{i}]", f"force.{axis}": f"{force}[{i}]"}
     return Stream(name, t_s, values), dt_s, names
 
 
@@ -207,7 +206,7 @@ def _height(log: _Log) -> Stream | None:
     return Stream(name, _published_s(topic), height - first if len(first) else height)
 
 
-def _attitude(log: _Log) -> tuple[Stream | None, Literal["truth", "filter"]]:
+def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
     for name, kind in ATTITUDES:
         found = log.first(name)
         if found is None:
