@@ -318,6 +318,26 @@ def test_messages_that_were_logged_late_arrive_in_order(logged, demand_same_rows
     assert log.repairs == ("GPS: 1 out of order, sorted",)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_log_damaged_anywhere_is_read_or_refused_in_one_line(logged, write, seed, capfd):
+    """Bytes overwritten, lost and doubled at random places: never another error, never a word on the terminal."""
+    rng = np.random.default_rng(seed)
+    raw = bytearray(b"".join(Writer(TODAY).log(messages(logged, "ATT"))))
+    for _ in range(rng.integers(1, 12)):
+        at, n = int(rng.integers(len(raw))), int(rng.integers(1, 300))
+        raw[at : at + n] = (rng.bytes(n), b"", raw[at : at + n] * 2, bytes(n))[rng.integers(4)]
+    refusal = ""
+    try:
+        log = write([bytes(raw)])
+    except LogError as error:
+        refusal = str(error)
+    else:
+        assert log.repairs
+        assert np.all(np.diff(log.rows["t_s"]) > 0.0)
+    assert "\n" not in refusal
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize(
     ("raw", "said"),
     [

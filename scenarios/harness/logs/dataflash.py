@@ -167,7 +167,8 @@ class _Log:
         of = self._formats[self._types[name]]
         own = self._codes[of.codes[of.columns.index(column)]][1] or 1.0
         # Divided, as the writer multiplied: 1/0.01 is a whole number, 0.01 is not.
-        values = records[column].astype(np.float64) / round(1.0 / own)
+        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+            values = records[column].astype(np.float64) / round(1.0 / own)
         return np.asarray(values * self._units.get((name, column), FIELDS.get(column, 1.0)))
 
     def time_s(self, name: str, records: NDArray[Any]) -> Array:

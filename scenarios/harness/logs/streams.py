@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import pymap3d  # type: ignore[import-untyped]
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
 from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs import checks, tabular
@@ -88,13 +89,15 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
 
 
 def _sane(stream: Stream, repairs: list[str]) -> NDArray[np.bool_]:
-    """All but messages whose time is far from that of both neighbours, which are near each other: damaged ones."""
+    """All but messages whose time is far from the median of the five about them: damaged ones, two at most in five.
+
+    Times that increase are their own median, next to a gap too; a clock that was set stays, and is refused later.
+    """
     t_s = stream.t_s
     if len(t_s) < 3:
         return np.ones(len(t_s), np.bool_)
-    far = np.abs(np.diff(t_s)) > checks.LATEST_S
-    across = np.abs(t_s[2:] - t_s[:-2]) <= checks.LATEST_S
-    wild = np.concatenate(([far[0] and not far[1]], far[:-1] & far[1:] & across, [far[-1] and not far[-2]]))
+    far = max(checks.LATEST_S, 3.0 * float(np.median(np.abs(np.diff(t_s)))))
+    wild = np.abs(t_s - median_filter(t_s, 5, mode="reflect")) > far
     if wild.any():
         first = int(np.argmax(wild))
         repairs.append(f"{stream.name}: {wild.sum()} at a time far from its neighbours left out, first {first + 1}")
@@ -110,6 +113,7 @@ def _intervals(t_s: Array, dt_s: Array, name: str, repairs: list[str]) -> Array:
             f"{name}: means over {1e3 * np.median(dt_s[missed]):g} ms logged every {1e3 * np.median(steps):g} ms; "
             "each stands for the time since the one before"
         )
+        return np.full(len(t_s), np.nan)
     return np.where(missed, np.nan, dt_s)
 
 

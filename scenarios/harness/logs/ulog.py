@@ -1,5 +1,7 @@
 """PX4's logs (.ulg), read with pyulog: sensor_combined or vehicle_imu, GPS, magnetometer, air data, attitude.
 
+Damaged bytes are taken out before, since pyulog gives up the rest of a log where they look like a long message.
+
 PX4's axes are ours: forward, right, down against north, east, down; its quaternions are w, x, y, z from body to earth.
 Where the simulator's attitude was logged (vehicle_attitude_groundtruth) it is the truth, else vehicle_attitude is
 what was flown on.
@@ -28,6 +30,9 @@ TOPICS = [
 ]  # fmt: skip
 FIX_3D = 3
 GAUSS_UT = 100.0
+HEADER_LENGTH, LONGEST = 16, 8192  # of the file; of a message, which definitions of topics come nearest to
+KINDS = frozenset(b"BFIMPQARDLCSO")  # of messages, by their letter
+DATA, ANNOUNCED, FLAGS = b"DAB"
 SLOWEST_S = 0.1  # vehicle_imu is by default logged twice a second, for statistics: not to be integrated
 NO_FORCE = 0x7FFFFFFF  # sensor_combined.accelerometer_timestamp_relative where there is no accelerometer
 
@@ -50,16 +55,45 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     return streams.recorded(path, messages, repairs)
 
 
-class _Bytes(io.BytesIO):
-    """A file in memory that knows whether the last message was whole: pyulog passes over one that was cut off."""
+def _whole(raw: bytes, repairs: list[str]) -> bytes:
+    """The log without bytes that are no whole message, which are counted.
 
-    cut = 0
+    A message is believed where another one, or the end, follows it.  Data must be of a topic that was announced, and
+    as long as the others of it.  Marks of data appended after a crash are taken out, since their places change.
+    """
+    end, at = len(raw), HEADER_LENGTH
+    parts, topics, lengths = [raw[:at]], set[int](), dict[int, int]()
+    bad, first = 0, -1
+    while at < end:
+        after = _after(raw, at)
+        known = after and (after == end or _after(raw, after, whole=False))
+        if known and raw[at + 2] == DATA:
+            topic = int.from_bytes(raw[at + 3 : at + 5], "little")
+            known = topic in topics and lengths.setdefault(topic, after - at) == after - at
+        if known:
+            body = raw[at + 3 : after]
+            if raw[at + 2] == ANNOUNCED:
+                topics.add(topic := int.from_bytes(body[1:3], "little"))
+                lengths.pop(topic, None)
+            if raw[at + 2] == FLAGS and len(body) >= 40:
+                body = body[:8] + bytes([body[8] & ~1]) + body[9:16] + bytes(24) + body[40:]
+            parts += (raw[at : at + 3], body)
+            at = after
+        else:
+            bad, first = bad + 1, at if first < 0 else first
+            at += 1
+    if bad:
+        repairs.append(f"{bad} bytes that are no whole message left out, first at byte {first}")
+    return b"".join(parts)
 
-    def read(self, size: int | None = -1) -> bytes:
-        """As that of `io.BytesIO`; `cut` is the bytes that came instead of more."""
-        data = super().read(size)
-        self.cut = len(data) if size is not None and len(data) < size else 0
-        return data
+
+def _after(raw: bytes, at: int, whole: bool = True) -> int:
+    """Where the message at `at` ends; 0 where there is none (or, if it must be `whole`, one that was cut off)."""
+    if at + 3 > len(raw):
+        return 0 if whole else at
+    length = int.from_bytes(raw[at : at + 2], "little")
+    after = at + 3 + length
+    return after if raw[at + 2] in KINDS and 0 < length <= LONGEST and (after <= len(raw) or not whole) else 0
 
 
 class _Log:
@@ -72,9 +106,9 @@ class _Log:
             raise LogError(f'{path}: logs of PX4 need pyulog: pip install "wingslevel[logs]"') from error
         self.path = path
         try:
-            file = _Bytes(path.read_bytes())
+            whole = _whole(path.read_bytes(), repairs)
             with contextlib.redirect_stdout(io.StringIO()):  # it prints what it found damaged
-                log = ULog(file, TOPICS)
+                log = ULog(io.BytesIO(whole), TOPICS)
         except OSError as error:
             raise LogError(f"{path}: cannot be read: {error.strerror}") from error
         except Exception as error:  # pyulog raises whatever its parser meets in a file that is none or damaged
@@ -82,10 +116,8 @@ class _Log:
         self.topics: dict[tuple[str, int], Mapping[str, NDArray[Any]]] = {}
         for topic in log.data_list:
             self.topics.setdefault((topic.name, topic.multi_id), topic.data)
-        if file.cut:
-            repairs.append(f"{file.cut} bytes at the end are no whole message: left out")
         if log.file_corruption:
-            repairs.append("damaged bytes between messages left out")
+            repairs.append("messages that contradict their topic left out")
         if log.dropouts:
             lost_s = sum(dropout.duration for dropout in log.dropouts) / 1000.0
             repairs.append(f"{len(log.dropouts)} times the logger could not follow, for {lost_s:.2f} s in all")
@@ -108,7 +140,8 @@ class _Log:
         missing = [field for field in fields if field not in topic]
         if missing:
             raise LogError(f"{self.path}: {name} has no field {', '.join(missing)}; it has {', '.join(topic)}")
-        return np.column_stack([topic[field].astype(np.float64) for field in fields])
+        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+            return np.column_stack([topic[field].astype(np.float64) for field in fields])
 
 
 def _each(name: str, n: int = 3) -> tuple[str, ...]:
