@@ -258,6 +258,17 @@ def test_damaged_bytes_are_left_out_and_counted(logged, write):
     np.testing.assert_allclose(log.rows["gyro_b_rad_s"], logged.rate, rtol=0, atol=1e-7)
 
 
+def test_log_with_data_appended_after_a_crash_is_read_whole(logged, demand_same_rows, write):
+    """The mark says at which byte the appended data begin, the message before them cut off; damage moves that place."""
+    records = ulog(messages(logged, "vehicle_imu"))
+    before = [records[0], b"\0" * 5, *records[1:3000], records[3000][:7]]
+    flags = bytes(8) + b"\x01" + bytes(7) + struct.pack("<3Q", sum(map(len, before)), 0, 0)
+    before[0] = before[0].replace(framed("B", bytes(40)), framed("B", flags))
+    log = write([*before, *records[3000:]])
+    demand_same_rows(log.rows, expected_of(logged), RESOLUTION)
+    assert log.repairs == (f"12 bytes that are no whole message left out, first at byte {len(records[0])}",)
+
+
 def test_damaged_times_are_left_out_and_late_ones_sorted(logged, write):
     """One clock reading with a flipped bit, two messages exchanged, one written twice."""
     records = ulog(messages(logged, "vehicle_imu"))

@@ -30,7 +30,8 @@ TOPICS = [
 ]  # fmt: skip
 FIX_3D = 3
 GAUSS_UT = 100.0
-HEADER_LENGTH, LONGEST = 16, 8192  # of the file; of a message, which definitions of topics come nearest to
+HEADER_LENGTH, FLAGS_LENGTH = 16, 43
+SHORTEST, LONGEST = 2, 8192  # bodies: of a dropout; no definition of a topic comes near the other
 KINDS = frozenset(b"BFIMPQARDLCSO")  # of messages, by their letter
 DATA, ANNOUNCED, FLAGS = b"DAB"
 SLOWEST_S = 0.1  # vehicle_imu is by default logged twice a second, for statistics: not to be integrated
@@ -61,39 +62,42 @@ def _whole(raw: bytes, repairs: list[str]) -> bytes:
     A message is believed where another one, or the end, follows it.  Data must be of a topic that was announced, and
     as long as the others of it.  Marks of data appended after a crash are taken out, since their places change.
     """
-    end, at = len(raw), HEADER_LENGTH
-    parts, topics, lengths = [raw[:at]], set[int](), dict[int, int]()
+    end, at, since = len(raw), HEADER_LENGTH, 0
+    parts, lengths = list[bytes](), dict[int, int]()  # of each topic that was announced, 0 before its first data
     bad, first = 0, -1
     while at < end:
         after = _after(raw, at)
-        known = after and (after == end or _after(raw, after, whole=False))
-        if known and raw[at + 2] == DATA:
-            topic = int.from_bytes(raw[at + 3 : at + 5], "little")
-            known = topic in topics and lengths.setdefault(topic, after - at) == after - at
-        if known:
-            body = raw[at + 3 : after]
-            if raw[at + 2] == ANNOUNCED:
-                topics.add(topic := int.from_bytes(body[1:3], "little"))
-                lengths.pop(topic, None)
-            if raw[at + 2] == FLAGS and len(body) >= 40:
-                body = body[:8] + bytes([body[8] & ~1]) + body[9:16] + bytes(24) + body[40:]
-            parts += (raw[at : at + 3], body)
-            at = after
-        else:
+        known = 0 < after <= end and (after + 3 > end or _after(raw, after) > 0)
+        kind = raw[at + 2] if known else 0
+        if kind == DATA:
+            topic = raw[at + 3] | raw[at + 4] << 8
+            usual = lengths.get(topic, -1)
+            known = usual in (0, after - at)
+            if usual == 0:
+                lengths[topic] = after - at
+        if not known:
+            parts.append(raw[since:at])
             bad, first = bad + 1, at if first < 0 else first
-            at += 1
+            at = since = at + 1
+            continue
+        if kind == ANNOUNCED:
+            lengths[int.from_bytes(raw[at + 4 : at + 6], "little")] = 0
+        elif kind == FLAGS and after - at >= FLAGS_LENGTH:
+            parts += (raw[since : at + 11], bytes([raw[at + 11] & ~1]), raw[at + 12 : at + 19], bytes(24))
+            since = at + FLAGS_LENGTH
+        at = after
+    parts.append(raw[since:])
     if bad:
         repairs.append(f"{bad} bytes that are no whole message left out, first at byte {first}")
     return b"".join(parts)
 
 
-def _after(raw: bytes, at: int, whole: bool = True) -> int:
-    """Where the message at `at` ends; 0 where there is none (or, if it must be `whole`, one that was cut off)."""
-    if at + 3 > len(raw):
-        return 0 if whole else at
-    length = int.from_bytes(raw[at : at + 2], "little")
-    after = at + 3 + length
-    return after if raw[at + 2] in KINDS and 0 < length <= LONGEST and (after <= len(raw) or not whole) else 0
+def _after(raw: bytes, at: int) -> int:
+    """Where the message that begins at `at` would end; 0 where none does."""
+    if at + 3 > len(raw) or raw[at + 2] not in KINDS:
+        return 0
+    length = raw[at] | raw[at + 1] << 8
+    return at + 3 + length if SHORTEST <= length <= LONGEST else 0
 
 
 class _Log:
