@@ -318,6 +318,14 @@ def test_messages_that_were_logged_late_arrive_in_order(logged, demand_same_rows
     assert log.repairs == ("GPS: 1 out of order, sorted",)
 
 
+def test_definition_before_damaged_bytes_is_kept(logged, demand_same_rows, write):
+    """Garbage behind an FMT record costs the garbage alone, and not all the messages of that type."""
+    records = Writer(TODAY, told=False).log(messages(logged))
+    log = write([records[0], bytes(9), *records[1:]])
+    demand_same_rows(log.rows, logged.expected(), RESOLUTION)
+    assert log.repairs == (f"9 bytes that are no whole record left out, first at byte {len(records[0])}",)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_log_damaged_anywhere_is_read_or_refused_in_one_line(logged, write, seed, capfd):
     """Bytes overwritten, lost and doubled at random places: never another error, never a word on the terminal."""

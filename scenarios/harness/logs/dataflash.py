@@ -104,19 +104,20 @@ class _Log:
         while at < end:
             length = lengths.get(raw[at + 2], 0) if raw.startswith(HEADER, at) and at + 2 < end else 0
             after = at + length
-            if length and after <= end and HEADER.startswith(raw[after : after + 2]):
-                kind = raw[at + 2]
+            kind, body = raw[at + 2] if length else 0, raw[at + 3 : after]
+            follows = length and after <= end and HEADER.startswith(raw[after : after + 2])
+            if follows or (kind == FMT and after <= end and HEADER not in body):  # without it a type would be lost
                 if kind == FMT:
-                    self._define(raw[at + 3 : after], lengths)
+                    self._define(body, lengths)
                 found[kind].append(at)
                 at = after
                 continue
-            follows = raw.find(HEADER, at + 1)
-            if follows < 0:
+            next_at = raw.find(HEADER, at + 1)
+            if next_at < 0:
                 self.repairs.append(f"{end - at} bytes at the end are no whole record: left out")
                 break
-            bad, first = bad + follows - at, at if first < 0 else first
-            at = follows
+            bad, first = bad + next_at - at, at if first < 0 else first
+            at = next_at
         if bad:
             self.repairs.insert(0, f"{bad} bytes that are no whole record left out, first at byte {first}")
         return found

@@ -33,7 +33,7 @@ GAUSS_UT = 100.0
 HEADER_LENGTH, FLAGS_LENGTH = 16, 43
 SHORTEST, LONGEST = 2, 8192  # bodies: of a dropout; no definition of a topic comes near the other
 KINDS = frozenset(b"BFIMPQARDLCSO")  # of messages, by their letter
-DATA, ANNOUNCED, FLAGS = b"DAB"
+DATA, ANNOUNCED, FORMAT, FLAGS = b"DAFB"
 SLOWEST_S = 0.1  # vehicle_imu is by default logged twice a second, for statistics: not to be integrated
 NO_FORCE = 0x7FFFFFFF  # sensor_combined.accelerometer_timestamp_relative where there is no accelerometer
 
@@ -59,15 +59,17 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
 def _whole(raw: bytes, repairs: list[str]) -> bytes:
     """The log without bytes that are no whole message, which are counted.
 
-    A message is believed where another one, or the end, follows it.  Data must be of a topic that was announced, and
-    as long as the others of it.  Marks of data appended after a crash are taken out, since their places change.
+    A message is believed where another one, or the end, follows it, or it is a definition in whole words: without it
+    a topic would be lost.  Data must be of a topic that was announced, and as long as the others of it.  Marks of data
+    appended after a crash are taken out, since their places change.
     """
     end, at, since = len(raw), HEADER_LENGTH, 0
     parts, lengths = list[bytes](), dict[int, int]()  # of each topic that was announced, 0 before its first data
     bad, first = 0, -1
     while at < end:
         after = _after(raw, at)
-        known = 0 < after <= end and (after + 3 > end or _after(raw, after) > 0)
+        known = 0 < after <= end
+        known = known and (after + 3 > end or _after(raw, after) > 0 or _is_definition(raw[at + 2 : after]))
         kind = raw[at + 2] if known else 0
         if kind == DATA:
             topic = raw[at + 3] | raw[at + 4] << 8
@@ -90,6 +92,12 @@ def _whole(raw: bytes, repairs: list[str]) -> bytes:
     if bad:
         repairs.append(f"{bad} bytes that are no whole message left out, first at byte {first}")
     return b"".join(parts)
+
+
+def _is_definition(message: bytes) -> bool:
+    """Whether the message, from its letter on, defines or announces a topic in printable letters to its end."""
+    text = message[1:] if message[0] == FORMAT else message[4:] if message[0] == ANNOUNCED else b""
+    return bool(text) and text.isascii() and text.decode().isprintable()
 
 
 def _after(raw: bytes, at: int) -> int:
