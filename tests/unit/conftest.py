@@ -18,7 +18,8 @@ FIELD_E_UT = np.array([21.5, 1.2, 43.0])
 
 @dataclass(frozen=True)
 class LoggedFlight:
-    """Inertial samples at 50 Hz, and what else was measured, at times (microseconds) between their ticks.
+    """Inertial samples at 50 Hz, and what else was measured, at times (microseconds) between their ticks,
+    and those of the air on ticks.
 
     Each of fix, field and air has ``_us`` shape (n,), and its values.
     """
@@ -87,7 +88,7 @@ def logged() -> LoggedFlight:
     acceleration = -amplitude * w**2 * np.sin(w * t_us[1:, None] / 1e6 + phase)
     force = R[1:].inv().apply(acceleration - [0.0, 0.0, 9.80665])
     fix_us, air_us = (
-        np.arange(t0_us + first, t_us[-1], every) for first, every in ((133_000, 200_000), (47_000, 100_000))
+        np.arange(t0_us + first, t_us[-1], every) for first, every in ((133_000, 200_000), (40_000, 100_000))
     )
     field_us = np.arange(t0_us + 81_000, t_us[-1], 100_000)
     p_e = position(fix_us)

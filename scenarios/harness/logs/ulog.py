@@ -60,8 +60,8 @@ def _whole(raw: bytes, repairs: list[str]) -> bytes:
     """The log without bytes that are no whole message, which are counted.
 
     A message is believed where another one, or the end, follows it, or it is a definition in whole words: without it
-    a topic would be lost.  Data must be of a topic that was announced, and as long as the others of it.  Marks of data
-    appended after a crash are taken out, since their places change.
+    a topic would be lost.  Data must be of a topic that was announced, and as long as the others of it.  The places of
+    data appended after a crash are taken out, since they change.
     """
     end, at, since = len(raw), HEADER_LENGTH, 0
     parts, lengths = list[bytes](), dict[int, int]()  # of each topic that was announced, 0 before its first data
@@ -85,7 +85,7 @@ def _whole(raw: bytes, repairs: list[str]) -> bytes:
         if kind == ANNOUNCED:
             lengths[int.from_bytes(raw[at + 4 : at + 6], "little")] = 0
         elif kind == FLAGS and after - at >= FLAGS_LENGTH:
-            parts += (raw[since : at + 11], bytes([raw[at + 11] & ~1]), raw[at + 12 : at + 19], bytes(24))
+            parts += (raw[since : at + 19], bytes(24))
             since = at + FLAGS_LENGTH
         at = after
     parts.append(raw[since:])
