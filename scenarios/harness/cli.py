@@ -248,6 +248,9 @@ def replay(
     columns: Annotated[
         str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")
     ] = None,
+    imu: Annotated[
+        int | None, typer.Option(min=0, metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0.")
+    ] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
     ] = None,
@@ -273,6 +276,7 @@ def replay(
                 out,
                 reference=reference,
                 columns=columns,
+                imu=imu,
                 params=_changes(set_),
                 window=Window(airborne, settle, calibration),
                 rerun=not no_rerun,
