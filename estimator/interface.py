@@ -42,11 +42,11 @@ MEASURED = (
     Column("gps_v_e_m_s", (3,), "reported velocity over the ground"),
     Column("gps_course_rad", (), "reported course over ground, from north over east, 0..2 pi"),
     Column("gps_speed_m_s", (), "reported ground speed, horizontal"),
-    Column("mag_new", (), "1 where a magnetometer sample arrived", integer=True),
-    Column("mag_b_ut", (3,), "magnetic field, microtesla"),
-    Column("air_new", (), "1 where an air-data sample arrived", integer=True),
-    Column("airspeed_m_s", (), "measured airspeed"),
-    Column("baro_height_m", (), "barometric height above the launch point"),
+    Column("mag_new", (), "1 where a magnetometer sample arrived in this tick", integer=True),
+    Column("mag_b_ut", (3,), "magnetic field of the last sample, microtesla"),
+    Column("air_new", (), "1 where an airspeed or a barometric height arrived in this tick", integer=True),
+    Column("airspeed_m_s", (), "last measured airspeed; with air data but no pitot tube, or none yet, NaN"),
+    Column("baro_height_m", (), "last barometric height above the launch point; likewise NaN"),
 )
 MEASURED_DTYPE = dtype_of(MEASURED)
 
@@ -83,7 +83,7 @@ class MagSample(NamedTuple):
 
 
 class AirData(NamedTuple):
-    """One air-data sample: airspeed and barometric height above the launch point."""
+    """The last air data: airspeed and barometric height above the launch point; NaN where one is not fitted."""
 
     airspeed_m_s: float
     height_m: float

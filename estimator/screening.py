@@ -15,7 +15,8 @@ G_M_S2 = 9.80665
 LONGEST_GAP_S = 0.5  # a longer silence says nothing of the attitude: the estimate goes on from where it was
 CLOCK_BACK_S = 1.0  # a time this far back is no late sample but a clock that was set
 COAST_S = 0.25  # how long the last good rate stands in for a broken gyro
-AT_REST_RAD_S, AT_REST_G = math.radians(20.0), 0.2  # mean samples further off are not of something at rest
+# Mean samples further off are not of something at rest; parts are sold with offsets of up to +-40 deg/s.
+AT_REST_RAD_S, AT_REST_G = math.radians(45.0), 0.2
 GYRO_RANGE_RAD_S = math.radians(2100.0)  # readings beyond are no measurement: just more than the largest parts have
 FORCE_RANGE_M_S2 = 17.0 * G_M_S2
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
+_SAMPLED_HZ = (1, 2, 2.5, 4, 5, 8, 10, 12.5, 20, 25, 40, 50, 100, 200)  # what a refused rate is told to try
+
 
 def _divides(rate_hz: float, base_hz: int) -> bool:
     return rate_hz > 0 and (Fraction(base_hz) / Fraction(str(rate_hz))).denominator == 1
@@ -49,6 +51,21 @@ class Rates:
     def steps_per_fix(self) -> int:
         """Physics steps between two GPS reports."""
         return int(Fraction(self.physics_hz) / Fraction(str(self.gps_hz)))
+
+    def steps_per_sample(self, what: str, rate_hz: float) -> int:
+        """Physics steps between two samples of the sensor `what`, which reports at `rate_hz`, once a tick at most.
+
+        Raises
+        ------
+        ValueError    the rate is above the inertial rate, or does not divide the physics rate
+        """
+        if not (rate_hz <= self.imu_hz and _divides(rate_hz, self.physics_hz)):
+            possible = [c for c in _SAMPLED_HZ if c <= self.imu_hz and _divides(c, self.physics_hz)]
+            raise ValueError(
+                f"{what} rate {rate_hz:g} Hz: choose one that divides the physics rate of {self.physics_hz} Hz and is "
+                f"at most the inertial rate, {', '.join(f'{c:g}' for c in possible)} Hz among others"
+            )
+        return int(Fraction(self.physics_hz) / Fraction(str(rate_hz)))
 
     def ticks(self, duration_s: float) -> int:
         """Whole ticks in `duration_s`."""

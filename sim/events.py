@@ -1,12 +1,14 @@
 """What happened in a flight, read from its log afterwards: phases, modes, the GPS, the end."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
 from autopilot.interface import Mode
 from estimator.interface import Health
-from sim.log import Event, Log, Outcome, Phase
+from sim.log import Event, Flight, Log, Outcome, Phase
+from sim.sensors.faults import Fault
 
 _GPS_SILENCE_S = 2.5  # without a fix for longer, the GPS counts as lost
 _PHASES = {Phase.HELD: "held in the hand", Phase.THROWN: "thrown", Phase.FLYING: "released"}
@@ -43,3 +45,13 @@ def events_of(log: Log, outcome: Outcome, message: str) -> tuple[Event, ...]:
         level: Literal["warn", "error"] = "warn" if outcome == Outcome.INTERRUPTED else "error"
         events.append(Event(float(t_s[-1]), message or outcome.replace("_", " "), level))
     return tuple(sorted(events, key=lambda e: e.t_s))
+
+
+def events_of_faults(faults: Sequence[Fault], flight: Flight) -> tuple[Event, ...]:
+    """Where each fault of the sensors begins and ends, as far as `flight` got; from power-up at the earliest."""
+    last_s = float(flight.log.truth["t_s"][-1]) if len(flight.log) else 0.0
+    events = []
+    for fault in faults:
+        begins_s, ends_s = max(flight.release_s + fault.from_s, 0.0), flight.release_s + fault.to_s
+        events += [Event(begins_s, f"fault {fault}", "warn"), Event(ends_s, f"fault {fault} over")]
+    return tuple(event for event in events if event.t_s <= last_s)

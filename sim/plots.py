@@ -1,7 +1,7 @@
 """What the plots of a flight show: angles, errors and signals made from the log, in the units people read.
 
 One colour means one thing everywhere: orange the truth, blue the estimate (and what is known aboard), green a
-sensor's reading, grey a demand.
+sensor's reading (blue-green one of the air data), grey a demand.
 """
 
 from typing import Any, NamedTuple
@@ -18,6 +18,7 @@ Range = tuple[float, float]
 TRUTH: Colour = (255, 150, 30)
 ESTIMATE: Colour = (60, 160, 255)
 SENSOR: Colour = (110, 200, 130)
+AIR_DATA: Colour = (70, 150, 190)
 DEMAND: Colour = (150, 150, 160)
 _INCLINATION: Colour = (240, 90, 150)
 _HEADING: Colour = (170, 130, 255)
@@ -45,7 +46,11 @@ _TRUE, _ESTIMATED, _DEMANDED = Curve("truth", TRUTH), Curve("estimate", ESTIMATE
 _SENSED = Curve("sensor", SENSOR)
 _HEADINGS = (Curve("true course", _COURSE), Curve("true nose", TRUTH), _ESTIMATED)
 _ERRORS = (Curve("total", DEMAND), Curve("heading", _HEADING), Curve("inclination", _INCLINATION))
-_SPEEDS = (Curve("GPS, over ground", SENSOR), Curve("true, over ground", TRUTH), Curve("true, in the air", _COURSE))
+_HEIGHTS = (Curve("GPS", SENSOR), Curve("barometer", AIR_DATA), _TRUE)
+_SPEEDS = (
+    Curve("GPS, over ground", SENSOR), Curve("pitot tube", AIR_DATA),
+    Curve("true, over ground", TRUTH), Curve("true, in the air", _COURSE),
+)  # fmt: skip
 PAGES: dict[str, tuple[Plot, ...]] = {
     "Attitude": (
         Plot("attitude/bank", "Bank, deg", (_DEMANDED, _TRUE, _ESTIMATED)),
@@ -56,12 +61,13 @@ PAGES: dict[str, tuple[Plot, ...]] = {
     "Gyro bias": tuple(Plot(f"gyro_bias/{a}", f"Gyro bias {a}, deg/s", (_TRUE, _ESTIMATED)) for a in "xyz"),
     "Gyro": tuple(Plot(f"gyro/{a}", f"Rate {a}, deg/s", (_SENSED, _TRUE)) for a in "xyz"),
     "Accelerometer": tuple(Plot(f"force/{a}", f"Specific force {a}, m/s²", (_SENSED, _TRUE)) for a in "xyz"),
+    "Magnetometer": tuple(Plot(f"field/{a}", f"Magnetic field {a}, µT", (_SENSED,)) for a in "xyz"),
     "Controls": tuple(
         Plot(f"controls/{c}", f"{c.capitalize()}", (Curve("command", ESTIMATE), Curve("position", TRUTH)))
         for c in ("aileron", "elevator", "rudder", "throttle")
     ),
     "Flight": (
-        Plot("flight/height", "Height above launch, m", (Curve("GPS", SENSOR), _TRUE)),
+        Plot("flight/height", "Height above launch, m", _HEIGHTS),
         Plot("flight/speed", "Speed, m/s", _SPEEDS),
         Plot("flight/wind_n", "Wind to the north, m/s", (_TRUE, _ESTIMATED)),
         Plot("flight/wind_e", "Wind to the east, m/s", (_TRUE, _ESTIMATED)),
@@ -90,6 +96,8 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
         inclination_error_rad(flown["R_eb"], truth["R_eb"]),
     )
     fixed = measured["gps_valid"] > 0
+    sampled, aired = np.cumsum(measured["mag_new"]) > 0, np.cumsum(measured["air_new"]) > 0
+    pitot_m_s, baro_m = (np.where(aired, measured[c], np.nan) for c in ("airspeed_m_s", "baro_height_m"))
     # A flight to the north is shown from -180 to 180, one to the south from 0 to 360: fewer leaps.
     cut_rad = -np.pi if np.mean(truth["R_eb"][:, 0, 0]) > 0.0 else 0.0
     bank_rad = flown["bank_demand_rad"], true_rad[0], estimated_rad[0]
@@ -98,14 +106,20 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
         "attitude/pitch": tuple(np.degrees(a) for a in (flown["pitch_demand_rad"], true_rad[1], estimated_rad[1])),
         "attitude/heading": tuple(_circle_deg(a, cut_rad) for a in (course_rad, true_rad[2], estimated_rad[2])),
         "attitude/error": tuple(np.degrees(a) for a in errors_rad),
-        "flight/height": (np.where(fixed, -measured["gps_p_e_m"][:, 2], np.nan), -truth["p_e_m"][:, 2]),
-        "flight/speed": (np.where(fixed, measured["gps_speed_m_s"], np.nan), ground_m_s, truth["airspeed_m_s"]),
+        "flight/height": (np.where(fixed, -measured["gps_p_e_m"][:, 2], np.nan), baro_m, -truth["p_e_m"][:, 2]),
+        "flight/speed": (
+            np.where(fixed, measured["gps_speed_m_s"], np.nan),
+            pitot_m_s,
+            ground_m_s,
+            truth["airspeed_m_s"],
+        ),
     }
     for i, axis in enumerate("xyz"):
         bias_rad_s = truth["gyro_bias_b_rad_s"][:, i], flown["gyro_bias_b_rad_s"][:, i]
         rate_rad_s = measured["gyro_b_rad_s"][:, i], truth["imu_omega_b_rad_s"][:, i]
         columns[f"gyro_bias/{axis}"] = tuple(np.degrees(a) for a in bias_rad_s)
         columns[f"gyro/{axis}"] = tuple(np.degrees(a) for a in rate_rad_s)
+        columns[f"field/{axis}"] = (np.where(sampled, measured["mag_b_ut"][:, i], np.nan),)
         columns[f"force/{axis}"] = measured["force_b_m_s2"][:, i], truth["imu_force_b_m_s2"][:, i]
     for control in ("aileron", "elevator", "rudder", "throttle"):
         columns[f"controls/{control}"] = flown[control], truth[control]

@@ -45,7 +45,7 @@ _GROUND: Colour = (66, 84, 66)
 _GRID: Colour = (92, 112, 90)
 _WIND: Colour = (120, 220, 230)
 _LARGE = 0.05  # the overview shows the aeroplane larger, by this times the reach in metres, or nobody would find it
-_WIDTHS = (2.4, 1.7, 1.2)  # of the lines of a plot: a lower one is seen beside those that cover it
+_WIDTHS = (2.4, 1.7, 1.2, 1.2)  # of the lines of a plot: a lower one is seen beside those that cover it
 _TRACK_HZ, _MAP_HZ = 25.0, 10.0  # the drawn tracks; the aeroplane on the map
 _STEP_RAD = np.radians(0.5)  # a control surface is drawn within this of where it is
 _GHOST, _THINNEST, _DENSER = 105, 10.0, 80.0  # opacity of 255: the estimate; the propeller at no throttle, more at full
@@ -372,11 +372,13 @@ def _blueprint(log: Log | None, release_s: float, ranges: Mapping[str, Range]) -
     )
     span = _span(log, release_s)
     axis = rrb.TimeAxis(view_range=span) if span else None
+    # A page of a sensor that is not fitted is left out.
+    pages = {name: plots for name, plots in PAGES.items() if not ranges or any(p.path in ranges for p in plots)}
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(chase, rrb.Horizontal(overview, words, column_shares=[5, 4]), row_shares=[3, 2]),
             rrb.Vertical(
-                rrb.Tabs(*(_page(name, plots, axis, ranges) for name, plots in PAGES.items()), active_tab=0),
+                rrb.Tabs(*(_page(name, plots, axis, ranges) for name, plots in pages.items()), active_tab=0),
                 rrb.StateTimelineView(origin="/states", name="Phase, mode, estimator", time_view=axis),
                 row_shares=[9, 2],
             ),

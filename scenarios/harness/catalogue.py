@@ -1,8 +1,9 @@
 """What there is to fly, told without importing any of it: a listing must not wait for compilers and engines."""
 
 import ast
-from collections.abc import Iterator
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from scenarios.harness import plugins
 
@@ -16,7 +17,8 @@ def catalogue() -> dict[str, dict[str, str]]:
         "estimators": {name: _about(where) for name, where in plugins.estimators().items()},
         "autopilots": {name: _about(where) for name, where in plugins.autopilots().items()},
         "aircraft": aircraft(),
-        "sensor suites": dict(_suites(_tree(_ROOT / "sim" / "sensors" / "suite.py"))),
+        "sensor suites": sensor_suites(),
+        "parts": parts(),
     }
     return {kind: dict(sorted(things.items())) for kind, things in found.items()}
 
@@ -50,11 +52,19 @@ def _about_aircraft(folder: Path) -> str:
     return _first_line(_tree(package)) if package.is_file() else ""
 
 
-def _suites(tree: ast.Module) -> Iterator[tuple[str, str]]:
-    """Names of the dict literal inside ``SUITES = ...``."""
-    for node in tree.body:
-        if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "SUITES" for t in node.targets):
-            for literal in ast.walk(node.value):
-                if isinstance(literal, ast.Dict):
-                    yield from ((str(ast.literal_eval(key)), "") for key in literal.keys if key is not None)
-                    return
+def sensor_suites() -> dict[str, str]:
+    """Names of the sensor suites there are, with what each one is."""
+    return {path.stem: _toml(path).get("summary", "") for path in (_ROOT / "sim" / "sensors" / "suites").glob("*.toml")}
+
+
+def parts() -> dict[str, str]:
+    """Names of the parts that have a data sheet here, with what each one is."""
+    return {path.stem: _about_part(_toml(path)) for path in (_ROOT / "sim" / "sensors" / "parts").glob("*.toml")}
+
+
+def _about_part(data: dict[str, Any]) -> str:
+    return f"{data.get('maker', '')} {data.get('name', '')}: {data.get('summary', '')}"
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text(encoding="utf-8"))

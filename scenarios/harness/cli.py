@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | bench | aircraft | view``.
+"""The command line: ``wingslevel list | fly | check | bench | aircraft | sensors | export | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
+from functools import partial
 from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Annotated, Any
@@ -62,11 +63,27 @@ AircraftOption = Annotated[str | None, typer.Option("--aircraft", help="Name of 
 AutopilotOption = Annotated[
     str | None, typer.Option("--autopilot", help="Registered name, module:Class or file.py:Class.")
 ]
-GpsRateOption = Annotated[float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS.")]
+GpsRateOption = Annotated[
+    float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.")
+]
 ImuRateOption = Annotated[
     int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
 ]
-SensorsOption = Annotated[str | None, typer.Option("--sensors", help="Name of a sensor suite.")]
+SensorsOption = Annotated[
+    str | None, typer.Option("--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.")
+]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        metavar="FAULT",
+        help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
+        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
+        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
+        "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
+        "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
+    ),
+]
 JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
@@ -119,7 +136,7 @@ def _root(
 
 @app.command("list")
 def list_(json_: JsonOption = None) -> None:
-    """What there is: scenarios, estimators, autopilots, aircraft, sensor suites."""
+    """What there is: scenarios, estimators, autopilots, aircraft, sensor suites, parts."""
     from scenarios.harness.catalogue import catalogue
 
     with _reporting(json_) as report:
@@ -143,6 +160,7 @@ def fly(
     gps_rate: GpsRateOption = None,
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
+    fault: FaultOption = None,
     duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the flight after the release.")] = None,
     seed: Annotated[
         int | None, typer.Option(help="Another seed, another flight; the same seed, the same bits. [default: 0]")
@@ -157,7 +175,7 @@ def fly(
     """Fly a scenario once, record it, judge it."""
     from scenarios.harness import single, viewing
 
-    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors) | _given(
+    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault) | _given(
         {"estimator": estimator, "duration_s": duration, "seed": seed}
     )
     with _reporting(json_) as report:
@@ -186,6 +204,7 @@ def check(
     gps_rate: GpsRateOption = None,
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
+    fault: FaultOption = None,
     set_: SetOption = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
@@ -199,7 +218,7 @@ def check(
         with usage():
             for path in (junit, markdown):
                 _check_file(path)
-            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors)
+            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
@@ -262,6 +281,68 @@ def aircraft(
 
 
 @app.command()
+def sensors(
+    part: Annotated[
+        str | None, typer.Argument(help="Name of a part or of a suite, or part.toml with one's own; all, where none.")
+    ] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
+    json_: JsonOption = None,
+) -> None:
+    """What sensors there are, or the page of one: its data sheet, its Allan deviation, what it does to a signal."""
+    from scenarios.harness import sensor_names
+
+    with _reporting(json_) as report:
+        if part is None:
+            if picture is not None:
+                raise _refusal(f"--picture {picture}: name the part or the suite to draw")
+            report(sensor_names.to_json())
+            sensor_names.tell()
+            return
+        from scenarios.harness import sensor_page
+
+        with usage():
+            _check_file(picture)
+            sensor_page.check_picture(picture)
+            subject = sensor_names.subject(part)
+        console.warn_if_cold()
+        with console.progress("lying still", "axis-hours") as advance:
+            page = sensor_page.make(subject, advance)
+        if picture is not None:
+            from scenarios.harness import sensor_picture
+
+            with usage():
+                sensor_picture.draw(page, picture)
+        report(page.to_json())
+        sensor_page.tell(page)  # last: a reader who closes the pipe loses no file
+
+
+@app.command()
+def export(
+    flight: Annotated[
+        Path | None, typer.Argument(help="Folder of a recording, or its .parquet file; by default the newest.")
+    ] = None,
+    nmea: Annotated[Path | None, typer.Option(metavar="FILE", help="Write NMEA 0183: GGA, RMC and VTG.")] = None,
+    ubx: Annotated[Path | None, typer.Option(metavar="FILE", help="Write UBX NAV-PVT.")] = None,
+    start: Annotated[
+        str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2025-06-01T12:00:00]")
+    ] = None,
+    json_: JsonOption = None,
+) -> None:
+    """The GPS fixes of a recording, as the sentences and messages that a receiver sends."""
+    with _reporting(json_) as report:
+        with usage():
+            from scenarios.harness import exporting, viewing
+
+            for path in (nmea, ubx):
+                _check_file(path)
+            done = exporting.make(flight or viewing.newest(FLIGHTS), nmea, ubx, exporting.parse_start(start))
+        for path, data in done.files.values():
+            _write(path, partial(bytes, data))
+        report(done.to_json())
+        exporting.tell(done)  # last: a reader who closes the pipe loses no file
+
+
+@app.command()
 def view(
     flight: Annotated[
         Path | None, typer.Argument(help="Folder of a recording, or a .rrd or .parquet file; by default the newest.")
@@ -288,11 +369,12 @@ def _changes(assignments: list[str] | None) -> dict[str, Any]:
 
 
 def _fitted(
-    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None
-) -> dict[str, Any]:
-    """What flies and what it carries, by the names of the configuration."""
+    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None,
+    faults: list[str] | None,
+) -> dict[str, Any]:  # fmt: skip
+    """What flies, what it carries and what of that fails, by the names of the configuration."""
     named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
-    return _given(named | {"suite": suite})
+    return _given(named | {"suite": suite, "faults": faults or None})
 
 
 def _given(named: dict[str, Any]) -> dict[str, Any]:
@@ -348,15 +430,17 @@ def _is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def _write(path: Path | None, text: Callable[[], str]) -> None:
+def _write(path: Path | None, content: Callable[[], str | bytes]) -> None:
     """Write a report, complete or not at all."""
     if path is None:
         return
     from sim.recording import replacing
 
+    made = content()
+    data = made.encode("utf-8") if isinstance(made, str) else made
     target = path.resolve()  # what a link points to is replaced, not the link
     if _is_stream(target):
-        target.write_text(text(), encoding="utf-8")
+        target.write_bytes(data)
         return
     with usage(), replacing(target) as temporary:
-        temporary.write_text(text(), encoding="utf-8")
+        temporary.write_bytes(data)

@@ -9,18 +9,21 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from scenarios.harness.air_config import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.air_config import parse_wind, resolve_air
-from scenarios.harness.fitted import dotted_fields, suite_params
-from scenarios.harness.plugins import near_misses
+from scenarios.harness.fault_config import require_faults_possible, typed_faults
+from scenarios.harness.fitted import suite_params
 from scenarios.harness.validation import validated
 from sim.clock import Rates
+from sim.params import dotted_fields, near_misses, require_fitted
 from sim.rng import stream
+from sim.sensors.fitting import own_files
 
 Chance = Literal["random"]
 Triple = tuple[float, float, float]
+Figure = float | bool | str | tuple[float, ...]  # what a field of a sensor can be; the dataclass says which
 
 
 class _Model(BaseModel):
@@ -28,19 +31,27 @@ class _Model(BaseModel):
 
 
 class RatesConfig(_Model):
-    """Rates in hertz; the slower ones divide the physics rate (`sim.clock.Rates`)."""
+    """Rates in hertz; the slower ones divide the physics rate (`sim.clock.Rates`).
+
+    gps_hz : None is the rate of the receiver that is fitted; a resolved configuration holds the number
+    """
 
     physics_hz: int = 200
     imu_hz: int = 50
-    gps_hz: float = 4.0
+    gps_hz: float | None = None
 
     @model_validator(mode="after")
     def _divide(self) -> "RatesConfig":
-        self.build()
+        if self.gps_hz is None:
+            Rates(self.physics_hz, self.imu_hz)
+        else:
+            self.build()
         return self
 
     def build(self) -> Rates:
-        """The clock of these rates."""
+        """The clock of these rates; ValueError where that of the GPS is still the receiver's own."""
+        if self.gps_hz is None:
+            raise ValueError("rates.gps_hz = None: resolve the configuration first")
         return Rates(self.physics_hz, self.imu_hz, self.gps_hz)
 
 
@@ -98,8 +109,11 @@ class FlightConfig(_Model):
 
     estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
     estimator_params : fields of the estimator's parameter dataclass
-    duration_s : after the release          suite, sensors : name of the suite, and fields changed in it by their
-    dotted names, ``{"gps.latency_s": 1.0}``            manoeuvre : the scenario's own parameters
+    duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
+    changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
+    files : path -> text of the files of one's own that the suite is made of; a resolved configuration holds them
+    manoeuvre : the scenario's own parameters
+    faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
     box_radius_m, box_height_m : of the cylinder around the launch point; beyond it the flight is over
     seed, flight : campaign and number of the flight in it, which name the random streams
     """
@@ -111,7 +125,9 @@ class FlightConfig(_Model):
     duration_s: float = Field(default=60.0, gt=0.0, le=36000.0)
     rates: RatesConfig = Field(default_factory=RatesConfig)
     suite: str = "generic"
-    sensors: dict[str, float] = Field(default_factory=dict)
+    sensors: dict[str, Figure] = Field(default_factory=dict)
+    files: dict[str, str] = Field(default_factory=dict)
+    faults: tuple[str, ...] = ()
     air: AirConfig = Field(default_factory=AirConfig)
     start: Annotated[InFlightStart | HandThrowStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
@@ -120,6 +136,11 @@ class FlightConfig(_Model):
     seed: int = Field(default=0, ge=0)
     flight: int = Field(default=0, ge=0)
 
+    @field_validator("faults", mode="before")
+    @classmethod
+    def _typed_faults(cls, faults: Any) -> Any:
+        return typed_faults(faults)
+
     @property
     def heading_deg(self) -> float:
         """Heading at the start; ValueError where it has not been drawn yet."""
@@ -127,6 +148,11 @@ class FlightConfig(_Model):
         if isinstance(heading_deg, str):
             raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
         return heading_deg
+
+    @property
+    def held_s(self) -> float:
+        """From power-up to the release."""
+        return self.start.hold_s + self.start.push_s if isinstance(self.start, HandThrowStart) else 0.0
 
 
 def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig:
@@ -140,6 +166,9 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
     ValueError      one line with the field, the value, its unit and what would be right
     """
     data = config.model_dump()
+    if "suite" in overrides:  # first, for its fields are named by other overrides; its files are read anew
+        data |= {"suite": str(overrides["suite"]), "files": {}}
+        config = config.model_copy(update={"suite": data["suite"], "files": {}})
     for name, value in overrides.items():
         if name == "wind":
             wind = parse_wind(str(value))
@@ -147,18 +176,21 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
         else:
             _put(data, _full_name(name, config), value)
     changed = validated(FlightConfig, data)
-    suite_params(changed.suite, changed.sensors)  # refuses a suite or a value that cannot be
+    # Refuses a suite, a value or a fault that cannot be.
+    require_faults_possible(changed.faults, suite_params(changed.suite, changed.sensors, changed.files))
     return changed
 
 
 def _full_name(name: str, config: FlightConfig) -> str:
     """Dotted name of a field that exists, or a ValueError with those that come near."""
-    fields = dotted_fields(suite_params(config.suite, {}))
+    fitted = suite_params(config.suite, {}, config.files)
+    fields = dotted_fields(fitted)
     if name in fields:
         return f"sensors.{name}"
     open_ended = name.startswith("estimator_params.")  # the estimator's own dataclass checks these
     known = [*_dotted(config), *(f"sensors.{f}" for f in fields), "wind"]
     if name not in known and not open_ended:
+        require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
         raise ValueError(f"unknown parameter {name!r}: {near_misses(name, [*known, *fields])}")
     return name
 
@@ -171,7 +203,7 @@ def _dotted(config: FlightConfig) -> list[str]:
             names += [f"{name}.{inner}" for inner in type(value).model_fields if inner != "kind"]
         elif name == "manoeuvre":
             names += [f"{name}.{inner}" for inner in value]
-        elif name not in ("sensors", "estimator_params"):
+        elif name not in ("sensors", "estimator_params", "files"):
             names.append(name)
     return names
 
@@ -181,7 +213,7 @@ def _put(data: dict[str, Any], name: str, value: Any) -> None:
     head, _, rest = name.partition(".")
     if not rest:
         data[head] = value
-    elif head == "estimator_params":
+    elif head in ("estimator_params", "sensors"):
         data[head] = {**data[head], rest: _literal(value)}
     else:
         data[head] = {**data[head], rest: value}
@@ -189,17 +221,34 @@ def _put(data: dict[str, Any], name: str, value: Any) -> None:
 
 def _literal(value: Any) -> Any:
     """Number, truth value or list that `value` spells, else the text itself."""
-    try:
-        return json.loads(value) if isinstance(value, str) else value
-    except json.JSONDecodeError:
+    if not isinstance(value, str):
         return value
+    for read in (json.loads, float):  # .5 is a number, but no JSON
+        try:
+            return read(value)
+        except ValueError:
+            continue
+    return value
 
 
 def resolve(config: FlightConfig) -> FlightConfig:
-    """`config` with everything that was left to chance drawn, each from its named stream; idempotent."""
+    """`config` with all that was left open in numbers: chance drawn, each from its named stream; idempotent.
+
+    The rate of the GPS becomes the receiver's own, and the files of one's own sensors are kept.
+    """
     start = _resolve_start(config)
     air = resolve_air(config.air, start.heading_deg, config.seed, config.flight)
-    return config.model_copy(update={"start": start, "air": air})
+    files = config.files or own_files(config.suite)
+    return config.model_copy(update={"start": start, "air": air, "files": files, "rates": _resolve_rates(config)})
+
+
+def _resolve_rates(config: FlightConfig) -> RatesConfig:
+    if config.rates.gps_hz is not None:
+        return config.rates
+    receiver = suite_params(config.suite, config.sensors, config.files).gps
+    rates = config.rates.model_copy(update={"gps_hz": receiver.rate_hz})
+    rates.build()  # refuses a receiver whose rate the physics cannot keep
+    return rates
 
 
 def _resolve_start(config: FlightConfig) -> Any:

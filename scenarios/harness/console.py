@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from scenarios.harness.checks import Row
+    from scenarios.harness.config import FlightConfig
 
 USAGE, INTERRUPTED = 2, 130  # exit codes, beside those of a verdict
 WIDTH = 80
@@ -50,6 +51,17 @@ def warn_if_cold() -> None:
 
     if is_cold():
         err().print("compiling the kernels, this once: about half a minute", style="dim")
+
+
+def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
+    """Say which faults the flight is too short for, each on a line of standard error."""
+    from scenarios.harness.fault_config import never_met
+
+    for fault in never_met(config.faults, config.held_s, config.duration_s):
+        error(
+            f"warning: fault {fault} is never met: {scenario} lasts from {-config.held_s:g} s to {config.duration_s:g} "
+            "s after the release"
+        )
 
 
 def number(value: float) -> str:
@@ -95,12 +107,21 @@ def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Table"
     return grid
 
 
-def table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]], text: Sequence[int] = (0,)) -> "Table":
-    """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty."""
+def table(
+    title: str,
+    headings: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    text: Sequence[int] = (0,),
+    wrapping: Sequence[int] = (),
+) -> "Table":
+    """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty.
+
+    Columns of `wrapping` give way where the table is too wide.
+    """
     grid = _table(title)
     grid.show_header = any(headings)
     for i, heading in enumerate(headings):
-        grid.add_column(heading, justify="left" if i in text else "right", no_wrap=True)
+        grid.add_column(heading, justify="left" if i in text else "right", no_wrap=i not in wrapping)
     for row in rows:
         grid.add_row(*row)
     return grid

@@ -8,12 +8,15 @@ from typing import Any
 from estimator.interface import AttitudeEstimator
 from scenarios.harness.air_config import build_air
 from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, override, resolve
-from scenarios.harness.fitted import changed, suite_params
+from scenarios.harness.fault_config import parse_fault
+from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator
 from scenarios.harness.scenario import Scenario
+from sim.events import events_of_faults
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Flight, Log
 from sim.loop import Watch, fly
+from sim.params import changed
 from sim.plant import HandThrow, InFlight, Start
 from sim.sensors.suite import Suite
 
@@ -62,7 +65,6 @@ def fly_config(
     """
     config = resolve(config)
     rates = config.rates.build()
-    suite = Suite(suite_params(config.suite, config.sensors), rates, config.seed, config.flight)
     estimator = maker() if maker is not None else _estimator(config)
     pilot = load_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft)
     script = scenario.script(config)
@@ -75,9 +77,11 @@ def fly_config(
         flight=config.flight,
         box=FlightBox(config.box_radius_m, config.box_height_m),
     )
+    faults = [parse_fault(fault) for fault in config.faults]
+    sensors = suite_params(config.suite, config.sensors, config.files)
     flown = fly(
         plant,
-        suite,
+        Suite(sensors, rates, config.seed, config.flight, faults, plant.release_s),
         estimator,
         pilot,
         script,
@@ -86,8 +90,9 @@ def fly_config(
         manifest={"scenario": scenario.name, "seed": config.seed, "config": config.model_dump(mode="json")},
         watch=watch,
     )
-    events = sorted((*flown.events, *scenario.events(flown)), key=lambda event: event.t_s)
-    return replace(flown, events=tuple(events))
+    events = (*flown.events, *events_of_faults(faults, flown), *scenario.events(flown))
+    events = tuple(sorted(events, key=lambda event: event.t_s))
+    return replace(flown, events=events)
 
 
 def start_of(config: FlightConfig) -> Start:

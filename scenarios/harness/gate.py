@@ -54,7 +54,8 @@ def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, cha
     """
     wanted = list(dict.fromkeys(names or registered()))
     for name in wanted:
-        prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
+        _, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
+        console.warn_of_faults(name, config)
     return [Task(name, seed, estimator, changes) for name in wanted for seed in seeds]
 
 

@@ -11,13 +11,12 @@ The class is called anew for each flight, without arguments (an autopilot's is g
 estimator and the name of its ``aircraft`` where it asks for them).  Only ``update`` is required of it.
 """
 
-import difflib
 import importlib
 import importlib.util
 import inspect
 import sys
 from collections import ChainMap
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -25,6 +24,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
+from sim.params import near_misses as near_misses
 
 if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
     from autopilot.interface import Autopilot
@@ -49,13 +49,6 @@ _AUTOPILOT = _Kind("autopilot", AUTOPILOTS, "wingslevel.autopilots", ("estimate"
 
 class PluginError(ValueError):
     """Flight code that cannot be found, loaded or used; the message is one line."""
-
-
-def near_misses(name: str, names: Iterable[str]) -> str:
-    """The end of a message about an unknown `name`: what it may have meant, or all there is."""
-    possible = sorted(names)
-    close = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
 
 
 def estimators() -> dict[str, str]:

@@ -80,15 +80,12 @@ class RealTime:
 
 def live(scenario: str, config: "FlightConfig", *, web: bool) -> RealTime:
     """Start the viewer for a flight to be flown under the resolved `config`; ValueError where it does not start."""
-    from scenarios.harness.config import HandThrowStart
     from scenarios.harness.plugins import heading_reference_of, load_estimator
     from sim import rerun_view
 
-    start = config.start
-    held_s = start.hold_s + start.push_s if isinstance(start, HandThrowStart) else 0.0
     reference = heading_reference_of(load_estimator(config.estimator))
     manifest = {"scenario": scenario, "config": config.model_dump(mode="json")}
     viewer = rerun_view.open_viewer(web=web)
     if viewer.address is not None:
         console.err().print(f"open {viewer.address}", soft_wrap=True)
-    return RealTime(viewer, rerun_view.LiveView(viewer.url, manifest, held_s, reference), config.rates.imu_hz)
+    return RealTime(viewer, rerun_view.LiveView(viewer.url, manifest, config.held_s, reference), config.rates.imu_hz)

@@ -1,12 +1,358 @@
-"""Faults of the sensors: what a channel does wrong in a window of time."""
+"""Faults of the sensors: what one channel does wrong in one window of time.
+
+Faults act on what the sensors report, one after another in the order given, so that two may overlap: a bias and a
+gain compose, and a reading that is stuck is the one last reported before its window, whatever made it.  A fault of
+a sensor that reports now and then (GPS, magnetometer, air data) acts on the reports that arrive in its window and
+leaves what is held between them alone.
+
+stuck           repeats what was last reported before the window; a GPS repeats its fix with new stamps, and brings
+                none where it had none
+dropout         nothing answers: gyro, accelerometer and air data read zero, a magnetometer brings no new sample
+outage          the same for a GPS: no new fix, the last good one is held
+nan             what arrives is no number
+spikes          a share of the readings is off by an amplitude, up or down; of a GPS, its position in any direction
+bias, gain      readings are off by an amount, or multiplied by a factor
+saturated       reads its full scale
+jump            the position of the fixes is displaced
+frozen_course   fixes keep the course last reported, 0 before the first, and their velocity points along it
+
+A reading that is off stays within the full scale of its part.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from enum import IntEnum
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from estimator.interface import Array
 from estimator.jit import kernel
+from sim.clock import Rates
+from sim.sensors.device import quantise
+from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Source
+from sim.sensors.receiver import hold
 
-FAULT = np.dtype([("kind", "i8"), ("channel", "i8"), ("first", "i8"), ("last", "i8"), ("value", "f8")], align=True)
+LATEST_S: Final = 36000.0
+
+
+class Kind(IntEnum):
+    """What goes wrong; the kernel's code for it."""
+
+    STUCK = 1  # 0 is nothing wrong
+    DROPOUT = 2
+    NAN = 3
+    SPIKES = 4
+    BIAS = 5
+    GAIN = 6
+    SATURATED = 7
+    OUTAGE = 8
+    JUMP = 9
+    FROZEN_COURSE = 10
+
+
+class _Part(NamedTuple):
+    """A sensor: its code, the unit of its faults and that in SI, its axes, what goes wrong where no value is given."""
+
+    code: int
+    unit: str
+    si: float
+    axes: int
+    bias: float
+    spikes: tuple[float, float]  # amplitude, share of the readings
+
+
+_GYRO, _ACCELEROMETER, _MAGNETOMETER, _AIRSPEED, _BAROMETER, _GPS = range(6)
+_PARTS: Final = {
+    "gyro": _Part(_GYRO, "deg/s", math.radians(1.0), 3, 5.0, (200.0, 0.02)),
+    "accelerometer": _Part(_ACCELEROMETER, "g", STANDARD_GRAVITY_M_S2, 3, 0.2, (2.0, 0.02)),
+    "magnetometer": _Part(_MAGNETOMETER, "uT", 1.0, 3, 10.0, (50.0, 0.1)),
+    "airspeed": _Part(_AIRSPEED, "m/s", 1.0, 1, 3.0, (10.0, 0.1)),
+    "barometer": _Part(_BAROMETER, "m", 1.0, 1, 10.0, (50.0, 0.1)),
+    "gps": _Part(_GPS, "m", 1.0, 1, 0.0, (50.0, 0.1)),
+}
+_FULL_SCALES: Final = {
+    "gyro": "range_deg_s",
+    "accelerometer": "range_g",
+    "magnetometer": "range_ut",
+    "airspeed": "range_pa",
+}
+_AIR: Final = ("airspeed", "barometer")
+_OF_READINGS: Final = ("stuck", "dropout", "nan", "spikes", "bias", "gain", "saturated")
+_OF_FIXES: Final = ("outage", "jump", "frozen_course", "stuck", "nan", "spikes")
+CHANNELS: Final = tuple(
+    name for part, of in _PARTS.items() for name in (part, *(f"{part}.{axis}" for axis in "xyz" if of.axes == 3))
+)
+
+
+def kinds_of(channel: str) -> tuple[str, ...]:
+    """What can go wrong with one of the CHANNELS."""
+    if channel == "gps":
+        return _OF_FIXES
+    if channel.startswith("magnetometer."):
+        return tuple(kind for kind in _OF_READINGS if kind != "dropout")  # its axes arrive together or not at all
+    return _OF_READINGS
+
+
+def defaults_of(channel: str, kind: str) -> tuple[float, ...]:
+    """The values of a fault where none are given; as many as it takes."""
+    part = _PARTS[channel.partition(".")[0]]
+    values = {"spikes": part.spikes, "bias": (part.bias,), "gain": (0.5,), "saturated": (1.0,), "jump": (50.0, 0.0)}
+    return values.get(kind, ())
+
+
+def unit_of(channel: str) -> str:
+    """Unit of a bias, of spikes, of a jump of `channel`."""
+    return _PARTS[channel.partition(".")[0]].unit
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One fault; its text ``channel:kind=values@from-to`` is what people type, and names its random stream.
+
+    channel : of CHANNELS                           kind : of `kinds_of` the channel
+    values : spikes amplitude, share of the readings; bias amount; gain factor; saturated +1 or -1; jump metres
+    north, east; in deg/s, g, uT, m/s, m; those not given are `defaults_of`
+    from_s, to_s : since the release; readings at from_s <= t < to_s are wrong, to_s infinite is to the end
+    """
+
+    channel: str
+    kind: str
+    values: tuple[float, ...] = ()
+    from_s: float = -LATEST_S
+    to_s: float = math.inf
+
+    def __post_init__(self) -> None:
+        if self.channel not in CHANNELS:
+            raise ValueError(f"fault of {self.channel!r}: choose from {', '.join(CHANNELS)}")
+        if self.kind not in kinds_of(self.channel):
+            raise ValueError(f"fault of {self.channel}: {self.kind!r} is not {', '.join(kinds_of(self.channel))}")
+        given = tuple(float(value) for value in self.values)
+        defaults = defaults_of(self.channel, self.kind)
+        if len(given) > len(defaults):
+            takes = f"at most {len(defaults)} values" if defaults else "no value"
+            raise ValueError(f"{self.what} = {_numbers(given)}: takes {takes}")
+        object.__setattr__(self, "values", given + defaults[len(given) :])
+        self._check_values()
+        if not (abs(self.from_s) <= LATEST_S and self.from_s < self.to_s and self.to_s > -LATEST_S):
+            raise ValueError(
+                f"{self.what} from {self.from_s!r} to {self.to_s!r} s: must begin within {LATEST_S:g} s of the release "
+                "and end later than it begins"
+            )
+
+    def _check_values(self) -> None:
+        shown = f"{self.what} = {_numbers(self.values)}"
+        if not all(math.isfinite(value) for value in self.values):
+            raise ValueError(f"{shown}: must be finite, in {unit_of(self.channel)}")
+        if self.kind == "saturated" and abs(self.values[0]) != 1.0:
+            raise ValueError(f"{shown}: must be 1, the upper end of the full scale, or -1, the lower")
+        if self.kind == "spikes" and not 0.0 < self.values[1] <= 1.0:
+            raise ValueError(f"{shown}: the second value is the share of the readings, above 0 and at most 1")
+
+    @property
+    def part(self) -> str:
+        """The sensor, by its name in the suite."""
+        return self.channel.partition(".")[0]
+
+    @property
+    def what(self) -> str:
+        """Channel and kind."""
+        return f"{self.channel}:{self.kind}"
+
+    def __str__(self) -> str:
+        values = f"={_numbers(self.values)}" if self.values else ""
+        end = f"-{_number(self.to_s)}" if math.isfinite(self.to_s) else ""
+        return f"{self.what}{values}@{_number(self.from_s)}{end}"
+
+
+def _number(value: float) -> str:
+    """Shortest decimal that reads back as `value`, without an exponent."""
+    if not math.isfinite(value):
+        return str(value)
+    return format(Decimal(repr(float(value))), "f").removesuffix(".0")
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ",".join(_number(value) for value in values)
+
+
+def require_possible(fault: Fault, suite: Any) -> None:
+    """Refuse a fault of a part that the parameters `suite` have not, or of a full scale that it has not: ValueError."""
+    part = getattr(suite, fault.part)
+    if part is None:
+        raise ValueError(f"fault {fault}: no {fault.part} is fitted; choose a suite that has one")
+    if fault.kind == "saturated" and not math.isfinite(getattr(part, _FULL_SCALES.get(fault.part, ""), math.inf)):
+        raise ValueError(f"fault {fault}: this {fault.part} has no full scale; choose another suite, or bias")
+
+
+FAULT = np.dtype(
+    [
+        ("kind", "i8"),  # 0: nothing wrong in this tick
+        ("part", "i8"),
+        ("axis", "i8"),
+        ("before", "i8"),  # the row reported last before the window
+        ("value", "f8"),
+        ("least", "f8"),  # the ends of the full scale
+        ("most", "f8"),
+    ],
+    align=True,
+)
+NO_FAULTS = np.zeros((0, 0), FAULT)
+
+
+def fault_table(
+    faults: Sequence[Fault], release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
+) -> NDArray[np.void]:
+    """What is wrong in each of `n` ticks, shape (n, m) of FAULT, a column for each axis of each fault; or NO_FAULTS.
+
+    release_s : since power-up              source : spikes are drawn from the stream "fault <its text>"
+    unit : shape (1,), the sensors as `Suite` made them
+    """
+    columns = [column for fault in faults for column in _columns(fault, source, n)]
+    if not columns:
+        return NO_FAULTS
+    table = np.zeros((n, len(columns)), FAULT)
+    for j, (fault, axis, values) in enumerate(columns):
+        first, end = (_first_tick(t_s + release_s, rates.imu_hz, n) for t_s in (fault.from_s, fault.to_s))
+        least, most = _span(fault.part, unit[0])
+        kind = Kind[fault.kind.upper()]
+        if kind is Kind.SATURATED:
+            values = np.where(values > 0.0, most, least)
+        wrong = table[first:end, j]
+        hit = _sampled(fault.part, rates, unit[0], n)
+        if kind is Kind.SPIKES:
+            hit &= values != 0.0
+        wrong["kind"] = np.where(hit[first:end], kind, 0)
+        wrong["part"], wrong["axis"], wrong["before"] = _PARTS[fault.part].code, axis, max(first - 1, 0)
+        wrong["value"], wrong["least"], wrong["most"] = values[first:end], least, most
+    return table
+
+
+def _first_tick(t_s: float, imu_hz: float, n: int) -> int:
+    """The first of `n` rows whose end is at `t_s` since power-up or later; a nanotick is round-off, not a tick."""
+    return n if math.isinf(t_s) else min(max(math.ceil(t_s * imu_hz - 1e-9) - 1, 0), n)
+
+
+def _columns(fault: Fault, source: Source, n: int) -> list[tuple[Fault, int, Array]]:
+    """Each axis of a fault, with its value in SI in each of `n` ticks."""
+    part, letter = _PARTS[fault.part], fault.channel.partition(".")[2]
+    axes = ["xyz".index(letter)] if letter else list(range(part.axes))
+    if fault.kind == "jump":
+        return [(fault, axis, np.full(n, metres)) for axis, metres in enumerate(fault.values)]
+    if fault.kind == "spikes":
+        amplitude, share = fault.values
+        axes = [0, 1] if fault.part == "gps" else axes
+        draws = source(f"fault {fault}").random((n, 4))
+        hit = np.where(draws[:, :1] < share, amplitude * part.si, 0.0)
+        azimuth = 2.0 * np.pi * draws[:, 1:2]
+        ways = np.hstack([np.cos(azimuth), np.sin(azimuth)]) if fault.part == "gps" else np.sign(draws[:, 1:] - 0.5)
+        return [(fault, axis, hit[:, 0] * ways[:, axis]) for axis in axes]
+    if fault.kind == "dropout" and fault.part == "magnetometer":
+        axes = [0]  # its sample is lost as a whole
+    value = fault.values[0] if fault.values else 0.0
+    si = part.si if fault.kind == "bias" else 1.0
+    return [(fault, axis, np.full(n, value * si)) for axis in axes]
+
+
+def _sampled(part: str, rates: Rates, unit: np.void, n: int) -> NDArray[np.bool_]:
+    """In which of `n` ticks something may be wrong: of air data those with a sample, which the log does not tell."""
+    steps = int(unit["air"][{"airspeed": "airspeed_steps", "barometer": "baro_steps"}[part]]) if part in _AIR else 1
+    end = np.arange(1, n + 1) * rates.steps_per_tick
+    sampled: NDArray[np.bool_] = end // steps * steps > end - rates.steps_per_tick
+    return sampled
+
+
+def _span(part: str, unit: np.void) -> tuple[float, float]:
+    """Lowest and highest reading of a part, in SI; infinite where nothing ends them."""
+    if part in ("gyro", "accelerometer"):
+        return quantise(-math.inf, unit[part]), quantise(math.inf, unit[part])
+    if part == "magnetometer":
+        count = float(unit[part]["step_ut"]) or 1.0
+        return count * float(unit[part]["lowest"]), count * float(unit[part]["highest"])
+    if part == "airspeed":
+        return 0.0, math.sqrt(2.0 * float(unit["air"]["range_pa"]) / float(unit["air"]["density_kg_m3"]))
+    return -math.inf, math.inf
 
 
 @kernel
 def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
-    """Apply to the measured row `k` the faults, shape (n,) of FAULT, whose window holds it, in their order."""
+    """Do to the measured row `k` what is wrong in it, in order; `faults` is shape (n, m) of FAULT.
+
+    What is added to an inertial reading is added to its bias in the truth too, and a gain multiplies both: the
+    bias is what the sensor reads too much.
+    """
+    row = measured[k]
+    for j in range(faults.shape[1]):
+        fault = faults[k, j]
+        before = measured[fault.before]
+        i = fault.axis
+        if fault.kind == 0:
+            continue
+        if fault.part == _GYRO:
+            row.gyro_b_rad_s[i] = _wrong(row.gyro_b_rad_s[i], before.gyro_b_rad_s[i], fault)
+            truth[k].gyro_bias_b_rad_s[i] = _wrong_bias(truth[k].gyro_bias_b_rad_s[i], fault)
+        elif fault.part == _ACCELEROMETER:
+            row.force_b_m_s2[i] = _wrong(row.force_b_m_s2[i], before.force_b_m_s2[i], fault)
+            truth[k].force_bias_b_m_s2[i] = _wrong_bias(truth[k].force_bias_b_m_s2[i], fault)
+        elif fault.part == _MAGNETOMETER and row.mag_new:
+            if fault.kind == Kind.DROPOUT:
+                row.mag_new = 0
+                for axis in range(3):
+                    row.mag_b_ut[axis] = measured[k - 1].mag_b_ut[axis] if k > 0 else 0.0
+            else:
+                row.mag_b_ut[i] = _wrong(row.mag_b_ut[i], before.mag_b_ut[i], fault)
+        elif fault.part == _AIRSPEED:
+            row.airspeed_m_s = _wrong(row.airspeed_m_s, before.airspeed_m_s, fault)
+        elif fault.part == _BAROMETER:
+            row.baro_height_m = _wrong(row.baro_height_m, before.baro_height_m, fault)
+        elif fault.part == _GPS and row.gps_new:
+            _spoil_fix(measured, k, fault)
+
+
+@kernel
+def _wrong(reading, before, fault):  # type: ignore[no-untyped-def]
+    """What is reported instead of `reading`, where `before` was reported last before the fault's window."""
+    if fault.kind == Kind.STUCK:
+        return before
+    if fault.kind == Kind.DROPOUT:
+        return 0.0
+    if fault.kind == Kind.NAN:
+        return np.nan
+    if fault.kind == Kind.SATURATED:
+        return fault.value
+    off = reading * fault.value if fault.kind == Kind.GAIN else reading + fault.value
+    return off if np.isnan(off) else min(max(off, fault.least), fault.most)
+
+
+@kernel
+def _wrong_bias(bias, fault):  # type: ignore[no-untyped-def]
+    """What the sensor reads too much, beside what it does without the fault."""
+    if fault.kind == Kind.BIAS:
+        return bias + fault.value
+    return bias * fault.value if fault.kind == Kind.GAIN else bias
+
+
+@kernel
+def _spoil_fix(measured, k, fault):  # type: ignore[no-untyped-def]
+    """Do to the fix that has arrived in row `k` what is wrong with it; the columns hold it until the next."""
+    row, before = measured[k], measured[fault.before]
+    if fault.kind == Kind.OUTAGE or (fault.kind == Kind.STUCK and not before.gps_valid):
+        row.gps_new = 0
+        hold(measured[k - 1], row)  # no fix is so early that it arrives in the very first row
+    elif fault.kind == Kind.STUCK:
+        stamp_s = row.gps_t_s
+        hold(before, row)
+        row.gps_t_s = stamp_s
+    elif fault.kind == Kind.NAN:
+        for i in range(3):
+            row.gps_p_e_m[i] = row.gps_v_e_m_s[i] = np.nan
+        row.gps_course_rad = row.gps_speed_m_s = np.nan
+    elif fault.kind == Kind.FROZEN_COURSE:
+        row.gps_course_rad = before.gps_course_rad
+        row.gps_v_e_m_s[0] = row.gps_speed_m_s * np.cos(row.gps_course_rad)
+        row.gps_v_e_m_s[1] = row.gps_speed_m_s * np.sin(row.gps_course_rad)
+    else:  # a jump, or one spike
+        row.gps_p_e_m[fault.axis] += fault.value

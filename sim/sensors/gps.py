@@ -1,22 +1,30 @@
-"""GPS receiver: a filter on the vectors, a report rate, a latency, noise, and a time to the first fix.
+"""GPS receiver: what it is like, and the errors of its fixes, drawn ahead; `sim.sensors.receiver` makes the fixes.
 
-Inside the receiver position and velocity pass a first-order filter, dy/dt = (u - y) / T, as the reports of
-small receivers show in turns.  Fix j is true at step j * steps_per_fix of the physics (between two ticks it
-is interpolated), carries that time as its stamp, and arrives in the first tick that ends at least a latency
-later.  The rows of the log are the filter's memory and the latency's history.
+position error = wander + white + jumps      velocity error = white + wander      lost, or not
+
+Wanders are first-order Gauss-Markov processes.  An outage begins and ends at random (the two-state chain of
+Gilbert, Capacity of a burst-noise channel, 1960): times with and without satellites are exponential.  A jump
+is a sudden offset, as where another set of satellites comes into use, which then decays exponentially.
+Whatever is off by default is exactly zero.
 """
 
 import math
 from dataclasses import dataclass
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.interface import Array
 from estimator.jit import kernel
 from sim.clock import Rates
+from sim.place import metres_per_degree
 from sim.sensors.noise import Source, gauss_markov, require
 
-_BELOW_TWO_PI = float(np.nextafter(2.0 * np.pi, 0.0))  # a course of -1e-17 must not round up to a full circle
+Resolution = Literal["none", "nmea", "binary"]
+Course = Literal["velocity", "positions"]
+
+KNOT_M_S: Final = 1852.0 / 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +38,21 @@ class GpsParams:
     velocity_noise_m_s : sigma of the white noise of each velocity component of a fix
     wander_horizontal_m, wander_vertical_m : sigma of the slowly wandering error of position, per axis
     wander_s : correlation time of that error
+    noise_horizontal_m, noise_vertical_m : sigma of the white noise of position, per axis
+    velocity_wander_m_s : sigma of the wandering error of each velocity component
+    velocity_wander_s : its correlation time
+    first_fix_spread_s : the first fix comes up to this much later, at random, all times alike: a cold start
+        waits for an ephemeris, which the satellites repeat every 30 s (IS-GPS-200)
+    resolution : of the messages: none, nmea (RMC and GGA) or binary (UBX NAV-PVT); see `sim.sensors.receiver`
+    minute_decimals : of latitude and longitude in NMEA, 4 or 5
+    course : velocity and course from the receiver's velocity, or from its last three positions
+    hold_below_m_s : static navigation, below this speed position and course are held; 0 is off
+    smoothing_s : time constant of track smoothing; 0 is off
+    outage_every_s : mean time with satellites between two outages; infinite is never
+    outage_s : mean length of an outage
+    jump_every_s : mean time between two jumps of position; infinite is never
+    jump_horizontal_m, jump_vertical_m : sigma of a jump, per axis
+    jump_decay_s : time constant with which a jump goes back
     """
 
     rate_hz: float = 4.0
@@ -40,13 +63,41 @@ class GpsParams:
     wander_horizontal_m: float = 1.5
     wander_vertical_m: float = 2.5
     wander_s: float = 30.0
+    noise_horizontal_m: float = 0.0
+    noise_vertical_m: float = 0.0
+    velocity_wander_m_s: float = 0.0
+    velocity_wander_s: float = 10.0
+    first_fix_spread_s: float = 0.0
+    resolution: Resolution = "none"
+    minute_decimals: int = 4
+    course: Course = "velocity"
+    hold_below_m_s: float = 0.0
+    smoothing_s: float = 0.0
+    outage_every_s: float = math.inf
+    outage_s: float = 5.0
+    jump_every_s: float = math.inf
+    jump_horizontal_m: float = 5.0
+    jump_vertical_m: float = 8.0
+    jump_decay_s: float = 20.0
 
     def __post_init__(self) -> None:
-        require(self, "s", "filter_s", "latency_s", "first_fix_s")
-        require(self, "m/s", "velocity_noise_m_s")
-        require(self, "m", "wander_horizontal_m", "wander_vertical_m")
-        require(self, "s", "wander_s", least=0.001)
+        require(self, "s", "filter_s", "latency_s", "first_fix_s", "first_fix_spread_s", "smoothing_s")
+        require(self, "m/s", "velocity_noise_m_s", "velocity_wander_m_s", "hold_below_m_s")
+        require(self, "m", "wander_horizontal_m", "wander_vertical_m", "noise_horizontal_m", "noise_vertical_m")
+        require(self, "m", "jump_horizontal_m", "jump_vertical_m")
+        require(self, "s", "wander_s", "velocity_wander_s", "outage_s", "jump_decay_s", least=0.001)
         require(self, "Hz", "rate_hz", least=0.1)
+        for name in ("outage_every_s", "jump_every_s"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"GpsParams.{name} = {getattr(self, name)!r} s: choose a number above 0, or infinity")
+        for name, choices in (
+            ("resolution", get_args(Resolution)),
+            ("course", get_args(Course)),
+            ("minute_decimals", (4, 5)),
+        ):
+            if getattr(self, name) not in choices:
+                possible = ", ".join(str(c) for c in choices)
+                raise ValueError(f"GpsParams.{name} = {getattr(self, name)!r}: choose one of {possible}")
 
 
 UNIT = np.dtype(
@@ -60,10 +111,23 @@ UNIT = np.dtype(
         ("steps_per_fix", "i8"),
         ("latency_steps", "i8"),
         ("first_fix_step", "i8"),
+        ("plain", "i8"),  # a fix is reported as it comes out of the filter: none of what follows
+        ("smoothing_s", "f8"),
+        ("hold_below_m_s", "f8"),
+        ("from_positions", "i8"),
+        ("polar", "i8"),  # velocity is told as speed and course alone
+        ("p_step_m", "f8", (3,)),  # resolutions; 0 is none
+        ("v_step_m_s", "f8"),
+        ("speed_step_m_s", "f8"),
+        ("course_steps", "f8"),  # in a full circle; 0 is not quantised
     ],
     align=True,
 )
-NOISE = (("gps_v_noise_e_m_s", "f8", (3,)), ("gps_p_wander_e_m", "f8", (3,)))
+NOISE = (
+    ("gps_v_noise_e_m_s", "f8", (3,)),  # white and wandering
+    ("gps_p_wander_e_m", "f8", (3,)),  # wandering, white, and what is left of the jumps
+    ("satellites_lost", "i8"),  # 1 in an outage
+)
 
 
 def _whole_steps(time_s: float, physics_hz: int) -> int:
@@ -71,7 +135,7 @@ def _whole_steps(time_s: float, physics_hz: int) -> int:
     return math.ceil(time_s * physics_hz - 1e-9)
 
 
-def make(params: GpsParams, rates: Rates, unit: NDArray[np.void]) -> None:
+def make(params: GpsParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
     """Make one receiver: set its constants in `unit`, shape (1,) of UNIT.
 
     The weights are the exact solution of the filter for a true value that is linear within the tick:
@@ -85,74 +149,84 @@ def make(params: GpsParams, rates: Rates, unit: NDArray[np.void]) -> None:
     unit["physics_hz"] = rates.physics_hz
     unit["steps_per_tick"], unit["steps_per_fix"] = rates.steps_per_tick, rates.steps_per_fix
     unit["latency_steps"] = _whole_steps(params.latency_s, rates.physics_hz)
-    unit["first_fix_step"] = _whole_steps(params.first_fix_s, rates.physics_hz)
+    first_fix_s = params.first_fix_s
+    if params.first_fix_spread_s > 0.0:
+        first_fix_s += params.first_fix_spread_s * source("gps first fix").random()
+    unit["first_fix_step"] = _whole_steps(first_fix_s, rates.physics_hz)
+    unit["smoothing_s"], unit["hold_below_m_s"] = params.smoothing_s, params.hold_below_m_s
+    unit["from_positions"] = params.course == "positions"
+    _set_resolution(params, unit)
+    unit["plain"] = (
+        params.resolution == "none"
+        and params.course == "velocity"
+        and params.smoothing_s == params.hold_below_m_s == 0.0
+    )
+
+
+def _set_resolution(params: GpsParams, unit: NDArray[np.void]) -> None:
+    """Set in `unit` the steps of the messages' fields.
+
+    NMEA 0183: ddmm.mmmm (or mmmmm), 0.1 m, 0.01 knot, 0.01 deg.  UBX NAV-PVT: 1e-7 deg, 1 mm, 1 mm/s, 1e-5 deg.
+    """
+    if params.resolution == "none":
+        return
+    north_m, east_m = metres_per_degree()
+    nmea = params.resolution == "nmea"
+    angle_deg = 10.0**-params.minute_decimals / 60.0 if nmea else 1e-7
+    unit["p_step_m"] = angle_deg * north_m, angle_deg * east_m, 0.1 if nmea else 0.001
+    unit["polar"] = nmea
+    unit["v_step_m_s"] = 0.0 if nmea else 0.001
+    unit["speed_step_m_s"] = 0.01 * KNOT_M_S if nmea else 0.001
+    unit["course_steps"] = 36_000.0 if nmea else 36_000_000.0
 
 
 def draw(params: GpsParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
     """Draw the errors of every tick into the columns NOISE of `noise`; a fix has those of its own tick."""
-    n = len(noise)
+    n, dt_s = len(noise), rates.dt_s
     sigma_m = np.array([params.wander_horizontal_m, params.wander_horizontal_m, params.wander_vertical_m])
     steps = source("gps wander").standard_normal((n, 3))
     white = source("gps velocity noise").standard_normal((n, 3))
     noise["gps_v_noise_e_m_s"] = params.velocity_noise_m_s * white
-    noise["gps_p_wander_e_m"] = gauss_markov(steps, sigma_m, params.wander_s, rates.dt_s)
+    noise["gps_p_wander_e_m"] = gauss_markov(steps, sigma_m, params.wander_s, dt_s)
+    if params.velocity_wander_m_s > 0.0:
+        steps, sigma_m_s = source("gps velocity wander").standard_normal((n, 3)), params.velocity_wander_m_s
+        noise["gps_v_noise_e_m_s"] += gauss_markov(steps, np.full(3, sigma_m_s), params.velocity_wander_s, dt_s)
+    white_m = np.array([params.noise_horizontal_m, params.noise_horizontal_m, params.noise_vertical_m])
+    if np.any(white_m > 0.0):
+        noise["gps_p_wander_e_m"] += white_m * source("gps position noise").standard_normal((n, 3))
+    if params.jump_every_s < math.inf:
+        noise["gps_p_wander_e_m"] += _jumps(params, dt_s, source, n)
+    if params.outage_every_s < math.inf:
+        chance = source("gps outages").random(n)
+        noise["satellites_lost"] = _outages(
+            chance, -math.expm1(-dt_s / params.outage_every_s), -math.expm1(-dt_s / params.outage_s)
+        )
+
+
+def _jumps(params: GpsParams, dt_s: float, source: Source, n: int) -> Array:
+    """Offset of position by jumps in each of `n` ticks, shape (n, 3).
+
+    At most one a tick; the variance settles at sigma^2 decay / (2 every) (Campbell's theorem).
+    """
+    sigma_m = np.array([params.jump_horizontal_m, params.jump_horizontal_m, params.jump_vertical_m])
+    size_m = sigma_m * source("gps jump sizes").standard_normal((n, 3))
+    begins = source("gps jumps").random(n) < -math.expm1(-dt_s / params.jump_every_s)
+    offset_m: Array = np.where(begins[:, None], size_m, 0.0)
+    _decay(offset_m, math.exp(-dt_s / params.jump_decay_s))
+    return offset_m
 
 
 @kernel
-def receive(truth, measured, noise, k, unit):  # type: ignore[no-untyped-def]
-    """Filter in tick `k`, hold the last fix, take in one that has arrived; `unit` is a record of UNIT."""
-    _filter(truth, k, unit)
-    measured[k].gps_new = 0
-    if k == 0:
-        measured[k].gps_valid = 0
-    else:
-        _hold(measured[k - 1], measured[k])
-    # The newest fix that can have arrived by the end of this tick, and the step at which it was true.
-    spt, spf = unit.steps_per_tick, unit.steps_per_fix
-    step = ((k + 1) * spt - unit.latency_steps) // spf * spf
-    if step + unit.latency_steps > k * spt and step >= max(unit.first_fix_step, spf):
-        _report(truth, measured[k], noise, step, spt)
-        measured[k].gps_t_s = step / unit.physics_hz
+def _decay(x, phi):  # type: ignore[no-untyped-def]
+    for k in range(1, x.shape[0]):
+        for i in range(x.shape[1]):
+            x[k, i] += phi * x[k - 1, i]
 
 
 @kernel
-def _filter(truth, k, unit):  # type: ignore[no-untyped-def]
-    row = truth[k]
-    if k == 0:  # as if it had moved at this velocity before
-        for i in range(3):
-            row.gps_v_e_m_s[i] = row.v_e_m_s[i]
-            row.gps_p_e_m[i] = row.p_e_m[i] - unit.filter_s * row.v_e_m_s[i]
-        return
-    last = truth[k - 1]
-    a, b, c = unit.before, unit.start, unit.end
-    for i in range(3):
-        row.gps_v_e_m_s[i] = a * last.gps_v_e_m_s[i] + b * last.v_e_m_s[i] + c * row.v_e_m_s[i]
-        row.gps_p_e_m[i] = a * last.gps_p_e_m[i] + b * last.p_e_m[i] + c * row.p_e_m[i]
-
-
-@kernel
-def _hold(last, row):  # type: ignore[no-untyped-def]
-    row.gps_valid = last.gps_valid
-    row.gps_t_s = last.gps_t_s
-    for i in range(3):
-        row.gps_p_e_m[i] = last.gps_p_e_m[i]
-        row.gps_v_e_m_s[i] = last.gps_v_e_m_s[i]
-    row.gps_course_rad = last.gps_course_rad
-    row.gps_speed_m_s = last.gps_speed_m_s
-
-
-@kernel
-def _report(truth, row, noise, step, steps_per_tick):  # type: ignore[no-untyped-def]
-    """Report what was inside the receiver at `step`, which lies in the tick whose row is `at`."""
-    at = (step + steps_per_tick - 1) // steps_per_tick - 1
-    late = (step - at * steps_per_tick) / steps_per_tick  # share of that tick gone by, 0 < late <= 1
-    newer, older, error = truth[at], truth[max(at - 1, 0)], noise[at]
-    p, v = row.gps_p_e_m, row.gps_v_e_m_s
-    for i in range(3):
-        p[i] = (1.0 - late) * older.gps_p_e_m[i] + late * newer.gps_p_e_m[i] + error.gps_p_wander_e_m[i]
-        v[i] = (1.0 - late) * older.gps_v_e_m_s[i] + late * newer.gps_v_e_m_s[i] + error.gps_v_noise_e_m_s[i]
-    course = np.arctan2(v[1], v[0])
-    row.gps_course_rad = course if course >= 0.0 else min(course + 2.0 * np.pi, _BELOW_TWO_PI)
-    row.gps_speed_m_s = np.sqrt(v[0] * v[0] + v[1] * v[1])
-    row.gps_new = 1
-    row.gps_valid = 1
+def _outages(chance, lose, find):  # type: ignore[no-untyped-def]
+    """1 in the ticks without satellites, from uniform `chance` and the probabilities of a change in a tick."""
+    lost = np.zeros(len(chance), np.int64)
+    for k in range(1, len(chance)):
+        lost[k] = 1 - (chance[k] < find) if lost[k - 1] else chance[k] < lose
+    return lost

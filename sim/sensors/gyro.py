@@ -1,10 +1,11 @@
 """Rate gyro: turn-on bias, drift, random walk, noise, gain and cross-axis errors, saturation, quantisation.
 
-reading = convert(M omega + bias(t) + noise),   M = 1 + diag(gain) + cross-axis,
-bias(t) = turn-on + drift t + random walk
+reading = convert(supply(curve(M omega + G f) + bias(t) + noise)),   M = (1 + diag(gain) + cross-axis) R_sb,
+bias(t) = turn-on + drift t + slope x warming(t) + flicker noise + random walk
 
 `omega` is the mean inertial rate over the tick.  The additive part bias(t) is what an estimator can learn as
-a bias; it is kept in the truth.  Terms as in IEEE Std 952 (rate ramp, rate random walk, angle random walk).
+a bias; it is kept in the truth.  Terms as in IEEE Std 952 (rate ramp, bias instability, rate random
+walk, angle random walk).
 """
 
 import math
@@ -15,17 +16,20 @@ from numpy.typing import NDArray
 
 from estimator.jit import kernel
 from sim.clock import Rates
-from sim.sensors.board import BoardParams
+from sim.sensors import device
+from sim.sensors.board import BoardParams, warming
+from sim.sensors.device import distort, on_supply, quantise, rate_shape, shake, step_filter
 from sim.sensors.noise import (
+    FLICKER_TIMES_S,
+    STANDARD_GRAVITY_M_S2,
     Output,
     Source,
-    convert,
+    flicker,
     random_walk,
     require,
     require_converter,
     require_device,
     sample_sigma,
-    step_of,
 )
 
 
@@ -37,7 +41,7 @@ class GyroParams:
 
     bias_deg_s : sigma of the bias at turn-on, constant in a flight
     bias_per_k_deg_s : sigma of the change of the bias with temperature, deg/s per kelvin
-    bias_instability_deg_s : floor of the Allan deviation, flicker noise's coefficient B of IEEE Std 952
+    bias_instability_deg_s : flicker noise's coefficient B of IEEE Std 952; alone it has an Allan deviation of 0.664 B
     drift_deg_s_min : sigma of a steady change of the bias, deg/s per minute
     walk_deg_s_sqrt_s : the bias walks at random, sigma after one second, deg/s per root second
     noise_density_deg_s_sqrt_hz : one-sided spectral density of the white noise, as data sheets give it
@@ -51,6 +55,7 @@ class GyroParams:
     conversions : of the converter averaged in a sample; 0 is a continuous mean
     output : digital, ratiometric (in proportion to the supply) or absolute (referred to a fixed voltage)
     null_deg_s : its output voltage without rotation, expressed in deg/s; what a wrong supply adds in proportion
+    sensitivity_mv_deg_s : of an analogue output; a board's converter makes its step of it
     """
 
     bias_deg_s: float = 1.0
@@ -71,9 +76,11 @@ class GyroParams:
     conversions: int = 0
     output: Output = "digital"
     null_deg_s: float = 0.0
+    sensitivity_mv_deg_s: float = 0.0
 
     def __post_init__(self) -> None:
         require(self, "deg/s", "bias_deg_s", "bias_instability_deg_s", "step_deg_s", "null_deg_s")
+        require(self, "mV/(deg/s)", "sensitivity_mv_deg_s")
         require(self, "deg/s/K", "bias_per_k_deg_s")
         require(self, "deg/s/sqrt(Hz)", "noise_density_deg_s_sqrt_hz")
         require(self, "1/K", "gain_per_k")
@@ -85,41 +92,92 @@ class GyroParams:
         require_converter(self, "deg/s", "range_deg_s")
 
 
-UNIT = np.dtype([("M", "f8", (3, 3)), ("step_rad_s", "f8"), ("range_rad_s", "f8")], align=True)
-MEMORY = np.dtype([("filtered", "f8", (3,))], align=True)  # state of the low-pass filter
+UNIT = np.dtype([*device.DEVICE, ("leans", "i8"), ("g_sensitivity", "f8", (3, 3))], align=True)
+MEMORY = np.dtype([*device.MEMORY], align=True)
 NOISE = (("gyro_bias_b_rad_s", "f8", (3,)), ("gyro_noise_b_rad_s", "f8", (3,)))
 
 
 def make(params: GyroParams, board: BoardParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
     """Make one gyro: draw the errors that stay for life into `unit`, shape (1,) of UNIT."""
-    M = np.diag(1.0 + params.gain * source("gyro gain").standard_normal(3))
-    off_diagonal = ~np.eye(3, dtype=bool)
-    M[off_diagonal] = params.cross_axis * source("gyro cross-axis").standard_normal(6)
-    unit["M"] = M
-    unit["range_rad_s"] = math.radians(params.range_deg_s)
-    unit["step_rad_s"] = step_of(math.radians(params.range_deg_s), params.bits)
+    device.make(
+        params, board, rates, source, unit, name="gyro",
+        full_scale=math.radians(params.range_deg_s), step=math.radians(params.step_deg_s),
+        null=math.radians(params.null_deg_s), shake=math.radians(board.vibration_deg_s),
+        density_sqrt_hz=math.radians(params.noise_density_deg_s_sqrt_hz),
+    )  # fmt: skip
+    if params.g_sensitivity_deg_s_g:
+        sigma = math.radians(params.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2
+        G = sigma * source("gyro g-sensitivity").standard_normal((3, 3))
+        unit["leans"], unit["g_sensitivity"] = 1, G @ device.axes(board.mounting_deg)
 
 
 def draw(params: GyroParams, board: BoardParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
     """Draw bias and noise of every tick of a flight into the columns NOISE of `noise`, shape (n,)."""
     n, dt_s = len(noise), rates.dt_s
-    t_s = np.arange(1, n + 1)[:, None] * dt_s
-    turn_on = params.bias_deg_s * source("gyro bias").standard_normal(3)
-    drift = params.drift_deg_s_min / 60.0 * source("gyro drift").standard_normal(3)
-    walk = random_walk(source("gyro walk").standard_normal((n, 3)), params.walk_deg_s_sqrt_s, dt_s)
-    white = source("gyro noise").standard_normal((n, 3))
-    noise["gyro_bias_b_rad_s"] = np.radians(turn_on + drift * t_s + walk)
-    noise["gyro_noise_b_rad_s"] = np.radians(sample_sigma(params.noise_density_deg_s_sqrt_hz, rates.imu_hz)) * white
+    t_s = np.arange(1, n + 1, dtype=np.float64)[:, None] * dt_s
+    bias_deg_s = np.zeros(3)
+    if params.bias_deg_s:
+        bias_deg_s = bias_deg_s + params.bias_deg_s * source("gyro bias").standard_normal(3)
+    if params.drift_deg_s_min:
+        bias_deg_s = bias_deg_s + params.drift_deg_s_min / 60.0 * source("gyro drift").standard_normal(3) * t_s
+    if params.bias_per_k_deg_s and board.warming_k:
+        slope_deg_s_k = params.bias_per_k_deg_s * source("gyro bias per kelvin").standard_normal(3)
+        bias_deg_s = bias_deg_s + slope_deg_s_k * warming(board, t_s)
+    if params.bias_instability_deg_s:
+        steps = source("gyro flicker").standard_normal((n, len(FLICKER_TIMES_S), 3))
+        bias_deg_s = bias_deg_s + flicker(steps, params.bias_instability_deg_s, dt_s)
+    if params.walk_deg_s_sqrt_s:
+        steps = source("gyro walk").standard_normal((n, 3))
+        bias_deg_s = bias_deg_s + random_walk(steps, params.walk_deg_s_sqrt_s, dt_s)
+    noise["gyro_bias_b_rad_s"] = np.radians(bias_deg_s)
+    noise["gyro_noise_b_rad_s"] = 0.0
+    if params.noise_density_deg_s_sqrt_hz:
+        sigma_rad_s = np.radians(sample_sigma(params.noise_density_deg_s_sqrt_hz, rates.imu_hz))
+        noise["gyro_noise_b_rad_s"] = sigma_rad_s * source("gyro noise").standard_normal((n, 3))
 
 
 @kernel
-def measure_rate(truth, measured, noise, k, unit, memory):  # type: ignore[no-untyped-def]
-    """Fill the gyro reading of row `k`, and the bias in the truth; `unit` is a record of UNIT."""
+def measure_rate(truth, measured, noise, k, unit, board, memory, state):  # type: ignore[no-untyped-def]
+    """Fill the gyro reading of row `k`, and the bias in the truth.
+
+    `unit`, `memory` : records of UNIT and MEMORY       `board`, `state` : records of the board's UNIT and MEMORY
+    """
     row, errors = truth[k], noise[k]
     omega = row.imu_omega_b_rad_s
+    if unit.filters or unit.shakes:
+        feel_rate(truth, k, unit, board, memory, state)
+        omega = memory.signal
     for i in range(3):
         bias = errors.gyro_bias_b_rad_s[i]
         turned = unit.M[i, 0] * omega[0] + unit.M[i, 1] * omega[1] + unit.M[i, 2] * omega[2]
-        sensed = turned + bias + errors.gyro_noise_b_rad_s[i]
-        measured[k].gyro_b_rad_s[i] = convert(sensed, unit.step_rad_s, unit.range_rad_s)
+        if unit.leans:
+            f, G = row.imu_force_b_m_s2, unit.g_sensitivity
+            turned += G[i, 0] * f[0] + G[i, 1] * f[1] + G[i, 2] * f[2]
+        if unit.distorts:
+            sensed = distort(turned, i, unit, state) + bias + errors.gyro_noise_b_rad_s[i]
+            sensed, bias = on_supply(sensed, unit, state), on_supply(bias, unit, state)
+        else:
+            sensed = turned + bias + errors.gyro_noise_b_rad_s[i]
+        measured[k].gyro_b_rad_s[i] = quantise(sensed, unit)
         row.gyro_bias_b_rad_s[i] = bias
+
+
+@kernel
+def feel_rate(truth, k, unit, board, memory, state):  # type: ignore[no-untyped-def]
+    """Mean over tick k of the rate behind the low-pass filter, vibration included, into `memory.signal`.
+
+    The rate in a tick is the parabola with its mean and its values at both ends; the means behind the filter err by
+    at most h^4 / 720 times the largest fourth derivative, to the next power of the tick h, whatever the bandwidth.
+    At power-up the filter has settled on the first rate.
+    """
+    for i in range(3):
+        mean = truth[k].imu_omega_b_rad_s[i]
+        if unit.filters:
+            rise, bulge = rate_shape(truth, k, i)
+            before = memory.filtered[i] if k > 0 else mean - 0.5 * rise
+            after = step_filter(unit.low_pass, before, mean, rise, bulge)
+            memory.filtered[i] = after
+            mean -= (after - before) * unit.low_pass[4]
+        memory.signal[i] = mean
+    if unit.shakes:
+        shake(unit, board, state, memory.signal)

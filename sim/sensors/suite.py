@@ -3,9 +3,8 @@
 Row k of the measured log is filled from the truth of rows up to k alone.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from functools import partial
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -16,48 +15,16 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log
 from sim.rng import stream
-from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer
-from sim.sensors.accelerometer import AccelerometerParams, measure_force
-from sim.sensors.air_data import AirspeedParams, BarometerParams, measure_air
-from sim.sensors.board import BoardParams
-from sim.sensors.faults import FAULT, spoil
-from sim.sensors.gps import GpsParams, receive
-from sim.sensors.gyro import GyroParams, measure_rate
-from sim.sensors.magnetometer import MagnetometerParams, measure_field
-
-
-@dataclass(frozen=True, slots=True)
-class SuiteParams:
-    """What is fitted, and how good each part is; None is not fitted."""
-
-    gyro: GyroParams = field(default_factory=GyroParams)
-    accelerometer: AccelerometerParams = field(default_factory=AccelerometerParams)
-    gps: GpsParams = field(default_factory=GpsParams)
-    magnetometer: MagnetometerParams | None = None
-    airspeed: AirspeedParams | None = None
-    barometer: BarometerParams | None = None
-    board: BoardParams = field(default_factory=BoardParams)
-
-
-_INF = float("inf")
-
-SUITES = MappingProxyType(
-    {
-        "generic": SuiteParams(),
-        "generic_6g": SuiteParams(accelerometer=AccelerometerParams(range_g=6.0)),
-        "ideal": SuiteParams(
-            GyroParams(
-                bias_deg_s=0.0, drift_deg_s_min=0.0, walk_deg_s_sqrt_s=0.0, noise_density_deg_s_sqrt_hz=0.0,
-                gain=0.0, cross_axis=0.0, range_deg_s=_INF, bits=0,
-            ),
-            AccelerometerParams(bias_g=0.0, noise_density_ug_sqrt_hz=0.0, range_g=_INF, bits=0),
-            GpsParams(
-                filter_s=0.0, latency_s=0.0, first_fix_s=0.0, velocity_noise_m_s=0.0,
-                wander_horizontal_m=0.0, wander_vertical_m=0.0,
-            ),
-        ),
-    }
-)  # fmt: skip
+from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
+from sim.sensors.accelerometer import measure_force
+from sim.sensors.air_data import measure_air
+from sim.sensors.board import attend
+from sim.sensors.faults import NO_FAULTS, Fault, fault_table, require_possible, spoil
+from sim.sensors.fitting import SUITES as SUITES
+from sim.sensors.fitting import SuiteParams as SuiteParams
+from sim.sensors.gyro import measure_rate
+from sim.sensors.magnetometer import measure_field
+from sim.sensors.receiver import receive
 
 UNIT = np.dtype(
     [
@@ -72,7 +39,16 @@ UNIT = np.dtype(
     align=True,
 )
 NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.NOISE, *air_data.NOISE], align=True)
-MEMORY = np.dtype([("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY)], align=True)
+MEMORY = np.dtype(
+    [
+        ("board", board.MEMORY),
+        ("gyro", gyro.MEMORY),
+        ("accelerometer", accelerometer.MEMORY),
+        ("gps", receiver.MEMORY),
+        ("air", air_data.MEMORY),
+    ],
+    align=True,
+)
 
 
 class Snapshot(NamedTuple):
@@ -85,14 +61,22 @@ class Snapshot(NamedTuple):
 
 
 class Suite:
-    """The sensors of flight number `flight` of the campaign `seed`, with `faults`, shape (n,) of FAULT.
+    """The sensors of flight number `flight` of the campaign `seed`, with `faults`.
 
-    Its errors are drawn in `reset`.  Filters remember in one record what rows of the log cannot tell.
+    The times of faults count from the release, `release_s` after power-up.  Errors are drawn in `reset`.  Filters
+    remember in one record what rows of the log cannot tell.
     """
 
     def __init__(
-        self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: NDArray[np.void] | None = None
-    ) -> None:
+        self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: Sequence[Fault] = (),
+        release_s: float = 0.0,
+    ) -> None:  # fmt: skip
+        for fault in faults:
+            require_possible(fault, params)
+        for what in ("magnetometer", "airspeed", "barometer"):
+            part = getattr(params, what)
+            if part is not None:
+                rates.steps_per_sample(what, part.rate_hz)  # refused here, before the flight
         self.params = params
         self.rates = rates
         self._source = partial(stream, seed, flight)
@@ -101,7 +85,8 @@ class Suite:
         self._noise = np.zeros(0, NOISE)
         self._unit = np.zeros(1, UNIT)
         self._memory = np.zeros(1, MEMORY)
-        self._faults = np.zeros(0, FAULT) if faults is None else faults
+        self.faults, self._release_s = tuple(faults), release_s
+        self._faults = NO_FAULTS
 
     def reset(self, log: Log) -> None:
         """Power up: draw the errors of a flight as long as `log`, whose rows `measure` fills from 0 on."""
@@ -111,12 +96,12 @@ class Suite:
         p, rates, source = self.params, self.rates, self._source
         unit, noise = np.zeros(1, UNIT), np.zeros(len(log), NOISE)
         unit["dt_s"] = rates.dt_s
-        board.make(p.board, unit["board"])
+        board.make(p.board, rates, source, unit["board"])
         gyro.make(p.gyro, p.board, rates, source, unit["gyro"])
         gyro.draw(p.gyro, p.board, rates, source, noise)
         accelerometer.make(p.accelerometer, p.board, rates, source, unit["accelerometer"])
         accelerometer.draw(p.accelerometer, p.board, rates, source, noise)
-        gps.make(p.gps, rates, unit["gps"])
+        gps.make(p.gps, rates, source, unit["gps"])
         gps.draw(p.gps, rates, source, noise)
         if p.magnetometer is not None:
             magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"])
@@ -125,6 +110,7 @@ class Suite:
             air_data.make(p.airspeed, p.barometer, rates, source, unit["air"])
             air_data.draw(p.airspeed, p.barometer, rates, source, noise)
         self._unit, self._noise, self._memory = unit, noise, np.zeros(1, MEMORY)
+        self._faults = fault_table(self.faults, self._release_s, rates, source, unit, len(log))
 
     def measure(self, k: int) -> Measurements:
         """Measure tick `k`, whose truth row is complete; a read-only view of its row.
@@ -158,12 +144,14 @@ def _measure(truth, measured, noise, k, unit, memory, faults):  # type: ignore[n
     u, m = unit[0], memory[0]
     measured[k].t_s = truth[k].t_s
     measured[k].dt_s = u.dt_s
-    measure_rate(truth, measured, noise, k, u.gyro, m.gyro)
-    measure_force(truth, measured, noise, k, u.accelerometer, u.board, m.accelerometer)
-    receive(truth, measured, noise, k, u.gps)
+    if u.board.changes:
+        attend(truth, k, u.board, m.board)
+    measure_rate(truth, measured, noise, k, u.gyro, u.board, m.gyro, m.board)
+    measure_force(truth, measured, noise, k, u.accelerometer, u.board, m.accelerometer, m.board)
+    receive(truth, measured, noise, k, u.gps, m.gps)
     if u.magnetometer.fitted:
         measure_field(truth, measured, noise, k, u.magnetometer)
     if u.air.fitted:
-        measure_air(truth, measured, noise, k, u.air)
+        measure_air(truth, measured, noise, k, u.air, m.air)
     if len(faults):
         spoil(truth, measured, k, faults)

@@ -9,8 +9,22 @@ from autopilot.interface import NEUTRAL
 from sim.clock import Rates
 from sim.log import Log
 from sim.prescribed_plant import PrescribedPlant, SteadyTurn
-from sim.sensors.suite import SUITES, Suite
+from sim.sensors.accelerometer import AccelerometerParams
+from sim.sensors.board import BoardParams
+from sim.sensors.gyro import GyroParams
+from sim.sensors.suite import SUITES as SHIPPED
+from sim.sensors.suite import Suite, SuiteParams
 
+DEVICE = {
+    "gain": 0.02, "gain_per_k": 1e-3, "nonlinearity": 0.002, "cross_axis": 0.01, "bandwidth_hz": 42.0,
+    "conversions": 4, "output": "absolute",
+}  # fmt: skip
+EVERYTHING = SuiteParams(
+    GyroParams(**DEVICE, g_sensitivity_deg_s_g=0.1, null_deg_s=300.0),
+    AccelerometerParams(**DEVICE, null_g=3.0),
+    board=BoardParams((0.1, 0.02, -0.05), (2.0, -1.0, 3.0), 0.02, 0.05, True, 10.0, 60.0, 0.3, 4.0),
+)  # every term of gyro, accelerometer and board that no shipped suite needs
+SUITES = {**SHIPPED, "everything": EVERYTHING}
 every_suite = pytest.mark.parametrize("name", SUITES)
 N = 150
 SENSED_TRUTH = ("gyro_bias_b_rad_s", "force_bias_b_m_s2", "gps_p_e_m", "gps_v_e_m_s")
@@ -23,6 +37,7 @@ def truth_log(n_ticks=2 * N, rates=None):
     plant.reset(log)
     for k in range(n_ticks):
         plant.advance(k, NEUTRAL)
+    log.truth["rotor_rpm"], log.truth["throttle"] = np.linspace(6000.0, 8000.0, n_ticks), np.linspace(0.3, 0.9, n_ticks)
     return log
 
 
@@ -139,10 +154,14 @@ def test_suite_row_outside_the_log_is_refused(name, k):
 @every_suite
 @pytest.mark.parametrize(("physics_hz", "imu_hz"), [(200, 40), (200, 50), (400, 100), (1000, 200)])
 def test_suite_at_every_rate_reports_all_channels_alive_and_finite(name, physics_hz, imu_hz):
-    """In a turn every channel that is fitted moves, is finite, and times run on evenly."""
-    rates = Rates(physics_hz, imu_hz)
-    log = truth_log(4 * imu_hz, rates)
-    suite = Suite(SUITES[name], rates, 0)
+    """In a turn every channel that is fitted moves, is finite, and times run on evenly; the others stay silent.
+
+    Every fix arrives that is true after the first one could be and is a latency old before the end.
+    """
+    fitted, seconds = SUITES[name], 4
+    rates = Rates(physics_hz, imu_hz, fitted.gps.rate_hz)
+    log = truth_log(seconds * imu_hz, rates)
+    suite = Suite(fitted, rates, 0)
     suite.reset(log)
     flown(name, log, suite=suite)
     rows = log.measured
@@ -151,6 +170,24 @@ def test_suite_at_every_rate_reports_all_channels_alive_and_finite(name, physics
         assert np.any(rows[column] != 0.0)
     np.testing.assert_allclose(np.diff(rows["t_s"]), 1.0 / imu_hz, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(rows["dt_s"], 1.0 / imu_hz)
-    assert rows["gps_new"].sum() >= 10
-    for column in ("mag_new", "air_new"):
-        np.testing.assert_array_equal(rows[column], 0)
+    true_at = np.arange(1, 1000) / rates.gps_hz
+    first, last = fitted.gps.first_fix_s, seconds - fitted.gps.latency_s
+    assert rows["gps_new"].sum() == np.sum((true_at >= first - 1e-9) & (true_at <= last + 1e-9)) > 0
+    assert_alive(rows, "mag_new", "mag_b_ut", fitted.magnetometer, seconds)
+    assert_alive(rows, "air_new", "airspeed_m_s", fitted.airspeed, seconds)
+    assert_alive(rows, "air_new", "baro_height_m", fitted.barometer, seconds)
+    if fitted.magnetometer is None:
+        np.testing.assert_array_equal(rows["mag_new"], 0)
+    if fitted.airspeed is None and fitted.barometer is None:
+        np.testing.assert_array_equal(rows["air_new"], 0)
+
+
+def assert_alive(rows, new, column, part, seconds):
+    """A part that is fitted reports at least four fifths of the samples of its rate; one that is not, no number."""
+    if part is None:
+        assert not np.any(np.nan_to_num(rows[column]))
+        return
+    fresh = rows[column][rows[new] == 1].reshape(np.sum(rows[new]), -1)
+    known = fresh[np.isfinite(fresh).all(axis=1)]
+    assert len(known) >= 0.8 * part.rate_hz * seconds
+    assert np.all(known != 0.0)

@@ -21,6 +21,7 @@ NOT_RUN = {
     r"git clone .*": "needs the network",
     r"make (fly|venv|lint|test)": "installs from the network; make test is what runs this",
     r"wingslevel view": "opens a window; refused without a display, see test_view_command_of_the_readme",
+    r"wingslevel export .*": "needs a flight, see test_export_command_of_the_readme",
     r"wingslevel fly hand_launch --live": "opens a window",
     r"wingslevel check --seeds 0-9 .*": "fifty flights, which tests/closed_loop flies; its options are run below",
 }  # fmt: skip
@@ -74,6 +75,14 @@ def test_view_command_of_the_readme_is_understood(here: Path, capsys, monkeypatc
         assert run(["view"]) == 2
         assert "--web" in capsys.readouterr().err
     assert (here / "flights" / "hand_launch-premerlani-seed0" / "flight.parquet").is_file()
+
+
+def test_export_command_of_the_readme_writes_what_it_names(here: Path) -> None:
+    """It takes the newest flight."""
+    (command,) = (c for c in commands() if c.startswith("wingslevel export"))
+    run(["fly", "hand_launch", "--duration", "2", "--no-rerun"])
+    assert run(shlex.split(command)[1:]) == 0
+    assert {"fixes.nmea", "fixes.ubx"} <= {path.name for path in here.iterdir()}
 
 
 @pytest.mark.usefixtures("here")

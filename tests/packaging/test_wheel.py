@@ -73,7 +73,8 @@ def test_wheel_contains_every_source_and_data_file(wheel: Path) -> None:
     }
     assert names == expected
     assert any(name.endswith(".xml") for name in names)
-    assert any(name.endswith(".toml") for name in names)
+    for folder in ("parts", "suites"):
+        assert any(name.startswith(f"sim/sensors/{folder}/") and name.endswith(".toml") for name in names)
 
 
 def test_wheel_installed_is_what_runs(installed: Path, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from sim.prescribed_plant import (
     rotation_from_euler,
 )
 from sim.truth import EARTH_RATE_RAD_S
+from sim.turn_table import TurnTable
 
 WIND = (3.0, -4.0, 0.5)
 MOTIONS = {
@@ -33,6 +34,7 @@ MOTIONS = {
     "straight_level": StraightLevel(0.7, wind_e_m_s=WIND, surge_m_s2=2.0),
     "steady_turn": SteadyTurn(math.radians(35.0), heading_rad=1.0, wind_e_m_s=WIND),
     "loop": Loop(heading_rad=-2.0, wind_e_m_s=WIND),
+    "turn_table": TurnTable(0.3, circle_s=2.0, quarter_s=1.2),
 }
 moving = pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS.keys())
 T_S = np.linspace(0.1, 6.0, 97)

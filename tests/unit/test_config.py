@@ -17,8 +17,9 @@ from scenarios.harness.config import (
     override,
     resolve,
 )
-from scenarios.harness.fitted import changed, suite_params
+from scenarios.harness.fitted import suite_params
 from sim.clock import Rates
+from sim.params import changed
 from sim.sensors.suite import SUITES
 
 THROW = FlightConfig(start=HandThrowStart(), air=AirConfig(wind_m_s=2.0, wind_from_deg="random"))
@@ -202,7 +203,7 @@ def test_changed_with_what_cannot_be_is_refused(changes, words):
 
 def test_rates_config_builds_the_clock_it_names():
     """The configuration adds nothing to the clock."""
-    assert FlightConfig().rates.build() == Rates()
+    assert resolve(FlightConfig()).rates.build() == Rates()
     assert override(CROSS, {"rates.imu_hz": "100", "rates.gps_hz": "2.5"}).rates.build() == Rates(200, 100, 2.5)
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from sim.rng import stream
-from sim.sensors.noise import convert, gauss_markov, random_walk, sample_sigma, step_of
+from sim.sensors.noise import gauss_markov, random_walk, sample_sigma
 
 DOUBTED_ONCE_IN = 1e-5  # probability of a chi-square outside its bounds by chance
 
@@ -17,33 +17,6 @@ def assert_sigma(samples, sigma):
     n = np.size(samples)
     low, high = stats.chi2.ppf([DOUBTED_ONCE_IN / 2, 1 - DOUBTED_ONCE_IN / 2], n)
     assert low <= np.sum(np.square(samples)) / sigma**2 <= high
-
-
-def test_convert_levels_are_exact_and_clip_as_twos_complement():
-    """A 10-bit converter over +-300 has 1024 levels of 600 / 1024 from -300 to one step below +300."""
-    step = step_of(300.0, 10)
-    assert step == 600.0 / 1024.0
-    levels = np.unique([convert(x, step, 300.0) for x in np.linspace(-400.0, 400.0, 20_001)])
-    np.testing.assert_array_equal(levels, step * np.arange(-512, 512))
-    assert convert(1e9, step, 300.0) == 300.0 - step
-    assert convert(-1e9, step, 300.0) == -300.0
-
-
-def test_convert_within_range_errs_by_half_a_step_at_most():
-    """Quantisation rounds to the nearest level."""
-    step = step_of(3.0, 10)
-    x = np.random.default_rng(2).uniform(-2.99, 2.99, 5000)
-    error = np.array([convert(v, step, 3.0) for v in x]) - x
-    assert np.abs(error).max() <= step / 2 + 1e-15
-    assert np.abs(error).max() >= 0.49 * step
-
-
-@pytest.mark.parametrize("x", [-5.0, -1.234567, 0.0, 1.234567, 5.0])
-def test_convert_without_bits_only_clips(x):
-    """Zero bits: the value itself, within the range; an infinite range passes everything."""
-    assert step_of(2.0, 0) == 0.0
-    assert convert(x, 0.0, 2.0) == min(max(x, -2.0), 2.0)
-    assert convert(x, 0.0, math.inf) == x
 
 
 def test_sample_sigma_is_the_density_times_the_root_of_half_the_rate():

@@ -93,7 +93,7 @@ def test_flights_and_seeds_are_all_different():
 
 
 def test_errors_switched_off_are_exactly_zero():
-    """The ideal suite has no error at all, though every stream is drawn."""
+    """The ideal suite has no error at all."""
     ideal = drawn(SUITES["ideal"])
     for name in NOISE.names:
         np.testing.assert_array_equal(ideal.noise[name], 0.0)

@@ -1,0 +1,105 @@
+"""The GPS fixes of a recorded flight as NMEA sentences and UBX messages, for programs that speak those."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from scenarios.harness import console
+from scenarios.harness.fitted import suite_params
+from sim import gps_messages, recording
+from sim.gps_messages import Accuracy, Fixes
+from sim.log import Flight
+
+
+@dataclass(frozen=True, slots=True)
+class Export:
+    """What is to be written of the recording `flight`: the bytes for each file, by format."""
+
+    flight: Path
+    fixes: Fixes
+    start: datetime
+    files: dict[str, tuple[Path, bytes]]
+
+    def utc(self, t_s: float) -> datetime:
+        """UTC at `t_s` since power-up."""
+        return self.start + timedelta(seconds=t_s)
+
+    def to_json(self) -> dict[str, Any]:
+        """The same for scripts."""
+        first_t_s, last_t_s = _span(self.fixes)
+        return {
+            "flight": str(self.flight),
+            "fixes": len(self.fixes),
+            "start_utc": self.start.isoformat(),
+            "first_t_s": first_t_s,
+            "last_t_s": last_t_s,
+            "files": [{"format": f, "file": str(p), "bytes": len(data)} for f, (p, data) in self.files.items()],
+        }
+
+
+def parse_start(text: str | None) -> datetime:
+    """A date and time; without a zone it is UTC, as in every message.  ValueError where it is none."""
+    if text is None:
+        return gps_messages.START
+    try:
+        start = datetime.fromisoformat(text)
+    except ValueError as error:
+        raise ValueError(
+            f"--start {text!r}: write a date and a time of UTC, for instance 2025-06-01T12:00:00"
+        ) from error
+    return start if start.tzinfo is not None else start.replace(tzinfo=gps_messages.START.tzinfo)
+
+
+def make(source: Path, nmea: Path | None, ubx: Path | None, start: datetime) -> Export:
+    """Put the fixes of the recording at `source` (as `view` takes it) into messages.
+
+    Raises
+    ------
+    ValueError      nothing asked for, no recording there, no fix in it, or a package that is missing
+    """
+    if nmea is None and ubx is None:
+        raise ValueError("nothing to write: name --nmea FILE, --ubx FILE or both")
+    if nmea is not None and ubx is not None and nmea.resolve() == ubx.resolve():
+        raise ValueError(f"--nmea and --ubx both name {nmea}: each needs a file of its own")
+    flight = recording.load(source.parent if source.suffix == ".rrd" else source)
+    fixes = Fixes.from_log(flight.log.measured, accuracy_of(flight))
+    if len(fixes) == 0:
+        raise ValueError(f"no GPS fix arrived in {source}: nothing to export")
+    encoders: dict[str, tuple[Path | None, Callable[..., bytes]]] = {
+        "NMEA": (nmea, gps_messages.encode_nmea),
+        "UBX": (ubx, gps_messages.encode_ubx),
+    }
+    files = {name: (path, encode(fixes, start=start)) for name, (path, encode) in encoders.items() if path is not None}
+    return Export(source, fixes, start, files)
+
+
+def accuracy_of(flight: Flight) -> Accuracy:
+    """What the receiver of `flight` may say of itself: the sigmas of its errors, unknown without a configuration."""
+    config = flight.manifest.get("config")
+    if config is None:
+        return Accuracy()
+    gps = suite_params(config["suite"], config["sensors"]).gps
+    both_axes_m = math.sqrt(2.0) * gps.wander_horizontal_m
+    return Accuracy(both_axes_m, gps.wander_vertical_m, gps.velocity_noise_m_s)
+
+
+def tell(export: Export) -> None:
+    """Print the table."""
+    from rich.markup import escape
+
+    first_t_s, last_t_s = _span(export.fixes)
+    times = ["none" if t is None else f"{export.utc(t):%H:%M:%S.%f}"[:-3] for t in (first_t_s, last_t_s)]
+    fixes = str(len(export.fixes))
+    rows = [(name, fixes, *times, str(len(data)), escape(str(path))) for name, (path, data) in export.files.items()]
+    headings = ("", "fixes", "first, UTC", "last, UTC", "bytes", "file")
+    title = f"GPS fixes of {export.utc(first_t_s or 0.0):%Y-%m-%d}"
+    console.out().print(console.table(title, headings, rows, text=(0, 5)))
+
+
+def _span(fixes: Fixes) -> tuple[float | None, float | None]:
+    """The first and the last stamp; None where there is none."""
+    stamps = [float(t) for t in fixes.t_s if math.isfinite(t)]
+    return (min(stamps), max(stamps)) if stamps else (None, None)

@@ -1,0 +1,308 @@
+"""GPS fixes as a plain structure, the place and the date it hangs from, and what is wrong with a file of them.
+
+Times are kept as whole nanoseconds of UTC while they are written and read, so that no digit is lost in a float.
+The simulated sea is the WGS 84 ellipsoid: height above the one is height above the other.
+"""
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final, Literal, NamedTuple
+
+import numpy as np
+import pymap3d
+from numpy.typing import NDArray
+
+from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
+
+Array = NDArray[np.float64]
+NAN: Final = float("nan")
+NS: Final = 1_000_000_000  # in a second
+EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+class Place(NamedTuple):
+    """Origin of the local north-east-down frame, `height_m` above the WGS 84 ellipsoid."""
+
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float
+
+
+LAUNCH: Final = Place(LATITUDE_DEG, LONGITUDE_DEG, ELEVATION_M)
+START: Final = datetime(2025, 6, 1, 12, tzinfo=UTC)
+"""When the power came up, unless told otherwise: fixed, so that the same flight gives the same file."""
+
+SATELLITES: Final = 12
+"""Satellites that a written fix names: none are simulated, and readers refuse a fix that has too few."""
+
+
+class Accuracy(NamedTuple):
+    """One sigma of what a receiver reports, as far as it is known: horizontal (both axes), vertical, speed."""
+
+    horizontal_m: float = NAN
+    vertical_m: float = NAN
+    speed_m_s: float = NAN
+
+
+@dataclass(frozen=True, slots=True)
+class Fixes:
+    """Fixes in the order in which they arrived, NaN where something is not known.
+
+    t_s : shape (n,)            when the fix was true, the receiver's stamp
+    arrival_s : shape (n,)      when it arrived; no message carries that
+    p_e_m, v_e_m_s : shape (n, 3)   north, east, down
+    course_rad, speed_m_s : shape (n,)   over ground, from north over east; horizontal
+    horizontal_acc_m, vertical_acc_m, speed_acc_m_s, course_acc_rad : shape (n,)   the receiver's own estimates
+    satellites : shape (n,)     how many it used
+    """
+
+    t_s: Array
+    arrival_s: Array
+    p_e_m: Array
+    v_e_m_s: Array
+    course_rad: Array
+    speed_m_s: Array
+    horizontal_acc_m: Array
+    vertical_acc_m: Array
+    speed_acc_m_s: Array
+    course_acc_rad: Array
+    satellites: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    @classmethod
+    def from_log(cls, measured: NDArray[Any], accuracy: Accuracy = Accuracy()) -> "Fixes":  # noqa: B008 - immutable
+        """The fixes that arrived in the rows `measured` of a log, from a receiver of known `accuracy`.
+
+        The uncertainty of the course is that of the speed across the track, over the speed.
+        """
+        rows = measured[measured["gps_new"] == 1]
+        n = len(rows)
+        return cls(
+            t_s=rows["gps_t_s"].copy(),
+            arrival_s=rows["t_s"].copy(),
+            p_e_m=rows["gps_p_e_m"].copy(),
+            v_e_m_s=rows["gps_v_e_m_s"].copy(),
+            course_rad=rows["gps_course_rad"].copy(),
+            speed_m_s=rows["gps_speed_m_s"].copy(),
+            horizontal_acc_m=np.full(n, accuracy.horizontal_m),
+            vertical_acc_m=np.full(n, accuracy.vertical_m),
+            speed_acc_m_s=np.full(n, accuracy.speed_m_s),
+            course_acc_rad=np.arctan2(accuracy.speed_m_s, rows["gps_speed_m_s"]),
+            satellites=np.full(n, SATELLITES),
+        )
+
+
+Kind = Literal[
+    "checksum",  # a message that was damaged on its way: dropped
+    "malformed",  # one that no receiver sends: dropped
+    "truncated",  # the end of the file is missing
+    "no time",  # a message that does not say when it was true: dropped
+    "no fix",  # the receiver says that it had none: dropped
+    "repeated",  # a message for a time that has one already: dropped
+    "out of order",  # a fix older than one before it: put where it belongs
+    "no height",  # kept, down is NaN
+    "no speed",  # kept, course, speed and velocity are NaN
+    "no course",  # kept, course is NaN, and the velocity too unless it is zero
+]
+
+
+class Problem(NamedTuple):
+    """Something that was dropped, repaired or missing, and where in the file."""
+
+    kind: Kind
+    where: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.kind}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a file held: its fixes in the order of their times, and what was wrong with it.
+
+    place, start : origin and zero of time of `fixes`, those asked for, or those of the first fix
+    ignored : messages that say nothing of a fix        problems : all others that were not simply taken
+    """
+
+    fixes: Fixes
+    place: Place
+    start: datetime
+    ignored: int
+    problems: tuple[Problem, ...]
+
+    def count(self, kind: Kind) -> int:
+        """How many problems of that kind."""
+        return sum(problem.kind == kind for problem in self.problems)
+
+
+@dataclass(slots=True)
+class Epoch:
+    """One fix while it is put together from its messages."""
+
+    where: str
+    latitude_deg: float = NAN
+    longitude_deg: float = NAN
+    height_m: float = NAN
+    v_e_m_s: tuple[float, float, float] = (NAN, NAN, NAN)
+    course_deg: float = NAN
+    speed_m_s: float = NAN
+    accuracy: tuple[float, float, float, float] = (NAN, NAN, NAN, NAN)  # of m, m, m/s and deg
+    satellites: int = 0
+    void: bool = False
+    seen: set[str] = field(default_factory=set)
+
+
+def needed(package: str) -> Any:
+    """The optional `package`; ValueError with what to install where it is missing."""
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise ValueError(f'{package} is not installed: pip install "wingslevel[logs]"') from error
+
+
+def utc_ns(start: datetime) -> int:
+    """Nanoseconds of UTC since 1970 at `start`; ValueError where its zone is not said."""
+    if start.tzinfo is None:
+        raise ValueError(f"start = {start.isoformat()}: say its time zone, for instance {start.isoformat()}Z")
+    return (start - EPOCH) // timedelta(microseconds=1) * 1000
+
+
+def stamps_ns(fixes: Fixes, start: datetime) -> list[int | None]:
+    """UTC of every fix, None where it has no time; ValueError where NMEA's two-digit year could not say it."""
+    zero = utc_ns(start)
+    stamps = [zero + round(t * NS) if np.isfinite(t) else None for t in fixes.t_s.tolist()]
+    known = [stamp for stamp in stamps if stamp is not None]
+    if known and (min(known) < _FIRST_NS or max(known) >= _END_NS):
+        raise ValueError(
+            f"start = {start.isoformat()}, with t_s of {np.nanmin(fixes.t_s):g} to {np.nanmax(fixes.t_s):g} s: "
+            "must lie between 6 January 1980, where GPS begins, and the end of 2068, where two-digit years do"
+        )
+    return stamps
+
+
+_FIRST_NS: Final = utc_ns(datetime(1980, 1, 6, tzinfo=UTC))
+_END_NS: Final = utc_ns(datetime(2069, 1, 1, tzinfo=UTC))
+
+
+def date_time(ns: int) -> datetime:
+    """UTC as a date and a time, to the microsecond below."""
+    return EPOCH + timedelta(microseconds=ns // 1000)
+
+
+def checked(place: Place) -> Place:
+    """`place`; ValueError where there is none such."""
+    if not (abs(place.latitude_deg) <= 90.0 and abs(place.longitude_deg) <= 180.0 and np.isfinite(place.height_m)):
+        raise ValueError(f"{place}: latitude must be -90..90 deg, longitude -180..180 deg, height a number of metres")
+    return place
+
+
+def geodetic(p_e_m: Array, place: Place) -> Array:
+    """Latitude, longitude (deg) and height (m) of positions of shape (n, 3).
+
+    Without down, NaN, the height is NaN and the rest is that of the place's own level; without north or east all are.
+    """
+    there = np.full_like(p_e_m, NAN)
+    known = np.isfinite(p_e_m[:, :2]).all(axis=1)
+    down_known = np.isfinite(p_e_m[:, 2])
+    if known.any():
+        n_m, e_m, d_m = p_e_m[known].T
+        there[known] = np.transpose(
+            pymap3d.ned2geodetic(n_m, e_m, np.where(np.isfinite(d_m), d_m, 0.0), *checked(place))
+        )
+    there[~down_known, 2] = NAN
+    return there
+
+
+def read(file: str | Path) -> bytes:
+    """All of `file`; ValueError where it cannot be read."""
+    try:
+        return Path(file).read_bytes()
+    except OSError as error:
+        raise ValueError(f"cannot read {file}: {error.strerror}") from error
+
+
+def assemble(
+    epochs: dict[int, Epoch], problems: list[Problem], ignored: int, place: Place | None, start: datetime | None
+) -> Reading:
+    """Fixes of the `epochs` (by their nanosecond of UTC, in the order of the file), those without a fix dropped.
+
+    Raises
+    ------
+    ValueError      no fix at all, with what was found instead
+    """
+    latest = None
+    kept = {}
+    for ns, epoch in epochs.items():
+        if epoch.void or not np.isfinite(epoch.latitude_deg + epoch.longitude_deg):
+            problems.append(Problem("no fix", epoch.where, "the receiver had none"))
+            continue
+        kept[ns] = epoch
+        if latest is not None and ns < latest:
+            problems.append(Problem("out of order", epoch.where, f"{(latest - ns) / NS:g} s older than one before it"))
+        latest = ns if latest is None else max(ns, latest)
+        problems += _gaps(epoch)
+    if not kept:
+        raise ValueError(f"no GPS fix in it{_told(problems, ignored)}")
+    times = sorted(kept)
+    ordered = [kept[ns] for ns in times]
+    place = _place(ordered) if place is None else checked(place)
+    start = date_time(times[0]) if start is None else start
+    return Reading(_fixes(times, ordered, place, utc_ns(start)), place, start, ignored, tuple(problems))
+
+
+def _gaps(epoch: Epoch) -> Iterable[Problem]:
+    if not np.isfinite(epoch.height_m):
+        yield Problem("no height", epoch.where, "down is not known")
+    if not np.isfinite(epoch.speed_m_s):
+        yield Problem("no speed", epoch.where, "velocity is not known")
+    elif not np.isfinite(epoch.course_deg):
+        yield Problem("no course", epoch.where, "only the speed is known")
+
+
+def _told(problems: list[Problem], ignored: int) -> str:
+    counts = Counter(str(problem.kind) for problem in problems)
+    if ignored:
+        counts["other messages"] = ignored
+    found = ", ".join(f"{kind} {n}" for kind, n in counts.items())
+    return f" (found: {found})" if found else ": neither a sentence nor a message was found"
+
+
+def _place(ordered: list[Epoch]) -> Place:
+    """Where the first fix was; at its height, or that of the first which has one."""
+    height_m = next((e.height_m for e in ordered if np.isfinite(e.height_m)), 0.0)
+    return Place(ordered[0].latitude_deg, ordered[0].longitude_deg, height_m)
+
+
+def _fixes(times: list[int], ordered: list[Epoch], place: Place, zero_ns: int) -> Fixes:
+    height_m = np.array([e.height_m for e in ordered])
+    known = np.isfinite(height_m)
+    p_e_m = np.transpose(
+        pymap3d.geodetic2ned(
+            np.array([e.latitude_deg for e in ordered]),
+            np.array([e.longitude_deg for e in ordered]),
+            np.where(known, height_m, place.height_m),  # north and east hardly depend on it
+            *place,
+        )
+    )
+    p_e_m[~known, 2] = NAN
+    horizontal, vertical, speed, course = np.array([e.accuracy for e in ordered]).T
+    return Fixes(
+        t_s=np.array([(ns - zero_ns) / NS for ns in times]),
+        arrival_s=np.full(len(times), NAN),
+        p_e_m=p_e_m,
+        v_e_m_s=np.array([e.v_e_m_s for e in ordered]),
+        course_rad=np.radians([e.course_deg for e in ordered]),
+        speed_m_s=np.array([e.speed_m_s for e in ordered]),
+        horizontal_acc_m=horizontal,
+        vertical_acc_m=vertical,
+        speed_acc_m_s=speed,
+        course_acc_rad=np.radians(course),
+        satellites=np.array([e.satellites for e in ordered]),
+    )

@@ -1,0 +1,287 @@
+"""GPS fixes as NMEA 0183 sentences, written and read with pynmeagps.
+
+Each fix is a GGA (position, height, satellites), an RMC (position, speed, course, date) and a VTG (course, speed).
+Resolution: time 1 ms, position 1e-7 minutes of arc (0.2 mm), height 1 mm, speed 0.001 knots, course 0.001 degrees;
+with these a sentence keeps within the 82 characters that the standard allows.  The sentences carry neither vertical
+velocity nor accuracies: these are NaN when read, and north and east velocity are those of course and speed.
+
+Fields are handed to pynmeagps as text: of numbers it would cut times to hundredths, write minutes as 60.00000 where
+they round up.  It frames, checks and parses the sentences.
+
+References: NMEA 0183 version 2.3 (fields, checksum: exclusive or of all characters between $ and *).
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from datetime import date, datetime, time
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from sim.gps_messages.fixes import (
+    EPOCH,
+    LAUNCH,
+    NAN,
+    NS,
+    START,
+    Epoch,
+    Fixes,
+    Place,
+    Problem,
+    Reading,
+    assemble,
+    date_time,
+    geodetic,
+    needed,
+    read,
+    stamps_ns,
+    utc_ns,
+)
+from sim.recording import replacing
+
+KNOT_M_S: Final = 1852.0 / 3600.0  # by definition
+_MINUTE: Final = 10**7  # units of position in a minute of arc
+_DAY_NS: Final = 86_400 * NS
+_OURS: Final = re.compile(rb"\$(?!P)[A-Z]{2}(GGA|RMC|VTG),")
+
+
+def write_nmea(fixes: Fixes, file: str | Path, place: Place = LAUNCH, start: datetime = START) -> Path:
+    """Write `encode_nmea` of the same arguments to `file`, complete or not at all, and return its path."""
+    path, data = Path(file), encode_nmea(fixes, place, start)
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
+    return path
+
+
+def read_nmea(file: str | Path, place: Place | None = None, start: datetime | None = None) -> Reading:
+    """`decode_nmea` of what is in `file`; ValueError, with its name, where it cannot be read or has no fix."""
+    try:
+        return decode_nmea(read(file), place, start)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+
+
+def encode_nmea(fixes: Fixes, place: Place = LAUNCH, start: datetime = START, talker: str = "GN") -> bytes:
+    """GGA, RMC and VTG of every fix, in the order of `fixes`.
+
+    A time, a height, a speed or a course that is not known is an empty field; without time or place there is no fix.
+
+    place : origin of the positions      start : UTC at which `t_s` is zero      talker : who speaks, two letters
+
+    Raises
+    ------
+    ValueError      pynmeagps is not installed, or a date that cannot be written
+    """
+    nmea = needed("pynmeagps")
+    if not re.fullmatch("[A-Z]{2}", talker):
+        raise ValueError(f"talker {talker!r}: must be two capital letters, for instance GN")
+    there = geodetic(fixes.p_e_m, place)
+    sentences = []
+    for i, ns in enumerate(stamps_ns(fixes, start)):
+        for name, payload in _payloads(fixes, i, ns, there[i].tolist()):
+            sentences.append(nmea.NMEAMessage(talker, name, nmea.GET, payload=payload).serialize())
+    return b"".join(sentences)
+
+
+def decode_nmea(data: bytes, place: Place | None = None, start: datetime | None = None) -> Reading:
+    """The fixes in `data`, from any receiver, among sentences and bytes of any other kind.
+
+    Sentences of the same time make one fix, whoever speaks them, and the first of a kind counts.  The date is that
+    of RMC, counted on from one to the next at midnight; where there is none it is that of `start`.
+
+    place : origin of the positions, the first fix by default
+    start : UTC at which `t_s` is zero, the time of the first fix by default
+
+    Raises
+    ------
+    ValueError      no fix in it, or pynmeagps is not installed
+    """
+    problems: list[Problem] = []
+    sentences, ignored = _sentences(data, problems)
+    epochs = _epochs(_groups(sentences, problems), start or START, problems)
+    return assemble(epochs, problems, ignored, place, start)
+
+
+def _payloads(fixes: Fixes, i: int, ns: int | None, there: list[float]) -> Iterator[tuple[str, list[str]]]:
+    """Name and fields of the three sentences of fix `i`."""
+    clock, day = _clock(ns)
+    good = ns is not None and math.isfinite(there[0])
+    position = [*_angle(there[0], 2, "NS"), *_angle(there[1], 3, "EW")] if good else [""] * 4
+    height = f"{round(there[2], 3) + 0.0:.3f}" if good and math.isfinite(there[2]) else ""  # never -0.000
+    speed, course = float(fixes.speed_m_s[i]), float(fixes.course_rad[i])
+    known = good and math.isfinite(speed) and math.isfinite(course)
+    knots = f"{speed / KNOT_M_S:.3f}" if known else ""
+    km_h = f"{1.852 * float(knots):.3f}" if known else ""  # of what is written, so that the two agree
+    millidegrees = round(math.degrees(course) * 1000) % 360_000 if known else 0  # 359.9996 is 0
+    degrees = f"{millidegrees // 1000}.{millidegrees % 1000:03d}" if known else ""
+    satellites = f"{fixes.satellites[i] if good else 0:02d}"
+    quality, status, mode = ("1", "A", "A") if good else ("0", "V", "N")
+    separation = "0.000" if good else ""  # of the geoid: the sea is the ellipsoid
+    yield "GGA", [clock, *position, quality, satellites, "", height, "M", separation, "M", "", ""]
+    yield "RMC", [clock, status, *position, knots, degrees, day, "", "", mode]
+    yield "VTG", [degrees, "T", "", "M", knots, "N", km_h, "K", mode]
+
+
+def _clock(ns: int | None) -> tuple[str, str]:
+    """hhmmss.sss and ddmmyy, to the nearest millisecond."""
+    if ns is None:
+        return "", ""
+    milliseconds = (ns + 500_000) // 1_000_000
+    moment = date_time(milliseconds * 1_000_000)
+    return f"{moment:%H%M%S}.{milliseconds % 1000:03d}", f"{moment:%d%m%y}"
+
+
+def _angle(angle_deg: float, digits: int, signs: str) -> tuple[str, str]:
+    """Degrees and minutes, and the hemisphere; counted in whole units, so that no minute rounds up to 60."""
+    units = round(abs(angle_deg) * 60 * _MINUTE)
+    degrees, rest = divmod(units, 60 * _MINUTE)
+    text = f"{degrees:0{digits}d}{rest // _MINUTE:02d}.{rest % _MINUTE:07d}"
+    return text, signs[angle_deg < 0.0 and units > 0]
+
+
+class _Sentence(NamedTuple):
+    where: str
+    name: str
+    message: Any
+
+
+def _sentences(data: bytes, problems: list[Problem]) -> tuple[list[_Sentence], int]:
+    """The sentences that speak of fixes, and how many do not."""
+    nmea = needed("pynmeagps")
+    found, ignored = [], 0
+    lines = data.split(b"\n")
+    for number, line in enumerate(lines, 1):
+        text = line[line.rfind(b"$") :].strip() if b"$" in line else b""
+        name = _OURS.match(text)
+        if name is None:
+            ignored += bool(line.strip())
+            continue
+        where = f"line {number}"
+        try:
+            message = nmea.NMEAReader.parse(text)
+            if message is None:
+                raise nmea.NMEAMessageError("no checksum, or bytes that are not text")
+            found.append(_Sentence(where, name[1].decode(), message))
+        except nmea.NMEAParseError as error:
+            kind = "truncated" if number == len(lines) else "checksum"
+            problems.append(Problem(kind, where, str(error)))  # type: ignore[arg-type]
+        except (nmea.NMEAMessageError, nmea.NMEATypeError) as error:
+            kind = "truncated" if number == len(lines) else "malformed"
+            problems.append(Problem(kind, where, str(error)))  # type: ignore[arg-type]
+    return found, ignored
+
+
+class _Group(NamedTuple):
+    """Neighbouring sentences of one time: nanoseconds since midnight, and the date where one says it."""
+
+    clock_ns: int
+    sentences: list[_Sentence]
+
+    @property
+    def day(self) -> int | None:
+        """Date of the group in days since 1970."""
+        dates = (getattr(s.message, "date", None) for s in self.sentences)
+        return next(((d - EPOCH.date()).days for d in dates if isinstance(d, date)), None)
+
+
+def _groups(sentences: list[_Sentence], problems: list[Problem]) -> list[_Group]:
+    """Sentences by their time; those that have none by nature (VTG) belong to the one before."""
+    groups: list[_Group] = []
+    current: _Group | None = None
+    for sentence in sentences:
+        if sentence.name != "VTG":
+            clock = sentence.message.time
+            if not isinstance(clock, time):
+                problems.append(Problem("no time", sentence.where, f"{sentence.name} without a time"))
+                current = None
+                continue
+            ns = ((clock.hour * 60 + clock.minute) * 60 + clock.second) * NS + clock.microsecond * 1000
+            if current is None or current.clock_ns != ns:
+                current = _Group(ns, [])
+                groups.append(current)
+        if current is not None:
+            current.sentences.append(sentence)
+    return groups
+
+
+def _epochs(groups: list[_Group], start: datetime, problems: list[Problem]) -> dict[int, Epoch]:
+    """Fixes by their nanosecond of UTC, in the order of the file."""
+    epochs: dict[int, Epoch] = {}
+    for ns, group in zip(_dated(groups, start), groups, strict=True):
+        epoch = epochs.setdefault(ns, Epoch(group.sentences[0].where))
+        for sentence in group.sentences:
+            if sentence.name in epoch.seen:
+                problems.append(Problem("repeated", sentence.where, f"another {sentence.name} of the same time"))
+                continue
+            epoch.seen.add(sentence.name)
+            try:
+                _TAKE[sentence.name](epoch, sentence.message)
+            except (AttributeError, TypeError, ValueError) as error:
+                problems.append(Problem("malformed", sentence.where, f"{sentence.name}: {error}"))
+    return epochs
+
+
+def _dated(groups: list[_Group], start: datetime) -> Iterator[int]:
+    """UTC of the groups.  A clock that falls by more than half a day has passed midnight."""
+    turns, before = [], 0
+    for last, group in zip([None, *groups], groups, strict=False):
+        if last is not None:
+            step = group.clock_ns - last.clock_ns
+            before += 1 if step < -_DAY_NS // 2 else -1 if step > _DAY_NS // 2 else 0
+        turns.append(before)
+    said = [(group.day, turn) for group, turn in zip(groups, turns, strict=True)]
+    first = next(((day, turn) for day, turn in said if day is not None), None)
+    base = utc_ns(start) // _DAY_NS if first is None else first[0] - first[1]
+    for group, (day, turn) in zip(groups, said, strict=True):
+        base = base if day is None else day - turn
+        yield (base + turn) * _DAY_NS + group.clock_ns
+
+
+def _take_gga(epoch: Epoch, m: Any) -> None:
+    if not m.quality:  # 0, or nothing
+        epoch.void = True
+        return
+    _take_position(epoch, m)
+    epoch.height_m = _number(m.alt) + (_number(m.sep) if m.sep != "" else 0.0)
+    epoch.satellites = m.numSV if m.numSV != "" else 0
+
+
+def _take_rmc(epoch: Epoch, m: Any) -> None:
+    if m.status != "A":
+        epoch.void = True
+        return
+    _take_position(epoch, m)
+    _take_motion(epoch, m.spd, m.cog)
+
+
+def _take_vtg(epoch: Epoch, m: Any) -> None:
+    _take_motion(epoch, m.sogn, m.cogt)
+
+
+_TAKE: Final = {"GGA": _take_gga, "RMC": _take_rmc, "VTG": _take_vtg}
+
+
+def _take_position(epoch: Epoch, m: Any) -> None:
+    """Latitude and longitude, unless another sentence has given them."""
+    latitude_deg, longitude_deg = _number(m.lat), _number(m.lon)
+    if m.NS not in ("N", "S") or m.EW not in ("E", "W"):
+        raise ValueError(f"hemispheres {m.NS!r} and {m.EW!r}: must be N or S, and E or W")
+    if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0):
+        raise ValueError(f"latitude {m.lat} deg, longitude {m.lon} deg: there is no such place")
+    if math.isnan(epoch.latitude_deg):
+        epoch.latitude_deg, epoch.longitude_deg = latitude_deg, longitude_deg
+
+
+def _take_motion(epoch: Epoch, speed_kn: Any, course_deg: Any) -> None:
+    """Speed, course and the velocity of both, as far as another sentence has not given them."""
+    if math.isnan(epoch.speed_m_s):
+        epoch.speed_m_s = _number(speed_kn) * KNOT_M_S
+    if math.isnan(epoch.course_deg):
+        epoch.course_deg = _number(course_deg) % 360.0
+    course = 0.0 if epoch.speed_m_s == 0.0 else math.radians(epoch.course_deg)  # at rest many leave it out
+    epoch.v_e_m_s = (epoch.speed_m_s * math.cos(course), epoch.speed_m_s * math.sin(course), NAN)
+
+
+def _number(value: Any) -> float:
+    """A field as a number; NaN where it is empty or no finite one."""
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) else NAN

@@ -1,0 +1,60 @@
+"""The earth's magnetic field at a place and a date: the World Magnetic Model.
+
+NOAA and BGS, "The US/UK World Magnetic Model for 2025-2030" (WMM2025): a spherical harmonic expansion of degree 12
+with a linear change in time.  It knows the core's field alone; rocks and steel nearby add their own.
+"""
+
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+
+from estimator.interface import Array
+
+FIRST_YEAR: Final = 2025.0
+LAST_YEAR: Final = 2030.0
+
+
+def require_year(owner: str, year: float) -> None:
+    """Refuse a date that the model does not cover: ValueError."""
+    if not FIRST_YEAR <= year <= LAST_YEAR:
+        raise ValueError(
+            f"{owner} = {year!r} (decimal): choose {FIRST_YEAR:g} to {LAST_YEAR:g}, the world magnetic model's years"
+        )
+
+
+@cache
+def _model() -> Any:
+    from pygeomag import GeoMag  # here, so that a flight without a magnetometer does not load it
+
+    return GeoMag(base_year=int(FIRST_YEAR))
+
+
+@cache
+def field_e_ut(latitude_deg: float, longitude_deg: float, height_m: float, year: float) -> Array:
+    """The field in north, east, down.
+
+    Parameters
+    ----------
+    latitude_deg, longitude_deg     geodetic, -90..90 and -180..180
+    height_m                        above the ellipsoid (or the sea: 30 m are 1 nT)
+    year                            decimal, 2025..2030
+
+    Returns
+    -------
+    shape (3,)      microtesla, read-only
+
+    Raises
+    ------
+    ValueError      a place that is not on earth, or a date that the model does not cover
+    """
+    require_year("year", year)
+    for name, angle_deg, most_deg in (("latitude_deg", latitude_deg, 90.0), ("longitude_deg", longitude_deg, 180.0)):
+        if not abs(angle_deg) <= most_deg:
+            raise ValueError(f"{name} = {angle_deg!r} deg: choose an angle from {-most_deg:g} to {most_deg:g} deg")
+    if not -1e3 <= height_m <= 850e3:
+        raise ValueError(f"height_m = {height_m!r} m: choose a height from -1000 to 850000 m, which the model covers")
+    found = _model().calculate(glat=latitude_deg, glon=longitude_deg, alt=1e-3 * height_m, time=year)
+    field = 1e-3 * np.array([found.x, found.y, found.z])  # it gives nanotesla
+    field.flags.writeable = False
+    return field

@@ -1,0 +1,151 @@
+"""Parameter dataclasses by name: their fields with dots, values of the right type, and what a wrong name may mean."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from types import UnionType
+from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+T = TypeVar("T")
+
+# What the end of a field's name says about its unit; the first that fits counts.
+_UNITS = (
+    ("noise_density_deg_s_sqrt_hz", "deg/s/sqrt(Hz)"), ("noise_density_ug_sqrt_hz", "ug/sqrt(Hz)"),
+    ("_deg_s_sqrt_s", "deg/s/sqrt(s)"), ("_ug_sqrt_s", "ug/sqrt(s)"), ("_deg_s_min", "deg/s/min"),
+    ("_per_k_deg_s", "deg/s/K"), ("_per_k_mg", "mg/K"), ("_per_k", "1/K"), ("mv_deg_s", "mV/(deg/s)"),
+    ("mv_g", "mV/g"), ("_deg_s_g", "deg/s/g"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_m_s2", "m/s2"),
+    ("_m_s", "m/s"), ("_deg", "deg"), ("_hz", "Hz"), ("_hpa", "hPa"), ("_pa", "Pa"), ("_ut", "uT"), ("_ug", "ug"),
+    ("_mg", "mg"), ("_rpm", "rpm"), ("_m", "m"), ("_g", "g"), ("_s", "s"), ("_k", "K"), ("_v", "V"),
+    ("bits", "bit"),
+)  # fmt: skip
+
+
+def unit_of(name: str) -> str:
+    """Unit that the end of a field's name says, empty where it says none."""
+    return next((unit for end, unit in _UNITS if name.endswith(end)), "")
+
+
+def words_of(name: str) -> str:
+    """What a field's name says besides its unit, as words: ``noise_density_ug_sqrt_hz`` is noise density."""
+    end = next((end.removeprefix("noise_density") for end, _ in _UNITS if name.endswith(end)), "")
+    return (name if end == "bits" else name.removesuffix(end)).replace("_", " ")
+
+
+def near_misses(name: str, names: Iterable[str]) -> str:
+    """The end of a message about an unknown `name`: what it may have meant, or all there is."""
+    possible = sorted(names)
+    close = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
+
+
+def dotted_fields(params: Any) -> list[str]:
+    """Names of the fields of a parameter dataclass, nested ones with dots; parts that are not fitted have none."""
+    names: list[str] = []
+    for f in fields(params):
+        value = getattr(params, f.name)
+        if is_dataclass(value):
+            names += [f"{f.name}.{inner}" for inner in dotted_fields(value)]
+        elif value is not None or not _is_part(type(params), f.name):
+            names.append(f.name)
+    return names
+
+
+def changed(params: T, changes: Mapping[str, Any], what: str) -> T:
+    """A copy of the frozen dataclass `params` with fields changed by their dotted names.
+
+    Raises
+    ------
+    ValueError      an unknown field of `what` (with the near misses), a part that is not fitted, or a value that
+                    the dataclass refuses
+    """
+    for name, value in changes.items():
+        known = dotted_fields(params)
+        if name not in known:
+            require_fitted(params, name, what)
+            raise ValueError(f"unknown parameter {name!r} of {what}: {near_misses(name, known)}")
+        params = _change(params, name, value, name, what)
+    return params
+
+
+def require_fitted(params: Any, name: str, what: str) -> None:
+    """Refuse the dotted `name` of a field of a part that `what` has not: ValueError."""
+    head = name.partition(".")[0]
+    if _is_part(type(params), head) and getattr(params, head) is None:
+        raise ValueError(f"parameter {name!r} of {what}: no {head} fitted; choose sensors that have one")
+
+
+def _is_part(owner: type, name: str) -> bool:
+    """Whether the field is a nested dataclass, or None where there is no such part."""
+    hint = get_type_hints(owner).get(name)
+    return any(is_dataclass(choice) for choice in (hint, *get_args(hint)))
+
+
+def _change(params: Any, rest: str, value: Any, name: str, what: str) -> Any:
+    head, _, rest = rest.partition(".")
+    if rest:
+        return replace(params, **{head: _change(getattr(params, head), rest, value, name, what)})
+    try:
+        value = typed(value, get_type_hints(type(params))[head])
+    except ValueError as error:
+        raise ValueError(f"{shown(name, value)} of {what}: {error}") from None
+    return replace(params, **{head: value})
+
+
+def shown(name: str, value: Any) -> str:
+    """A field with its value and unit, as messages name it."""
+    return f"{name} = {value!r} {unit_of(name)}".rstrip()
+
+
+def typed(value: Any, hint: Any) -> Any:
+    """`value` as the type that a dataclass declares: a number is a float, three numbers are a tuple.
+
+    Raises
+    ------
+    ValueError      what it must be
+    """
+    origin = get_origin(hint)
+    if origin in (Union, UnionType):
+        return _one_of(value, get_args(hint))
+    if origin is Literal:
+        if value not in get_args(hint):
+            raise ValueError(f"must be {' or '.join(map(str, get_args(hint)))}")
+        return value
+    if origin is tuple:
+        return _numbers(value, get_args(hint))
+    if hint is bool:
+        if value not in (True, False):
+            raise ValueError("must be true or false")
+        return bool(value)
+    if hint in (int, float):
+        return _number(value, hint)
+    if hint is str and not isinstance(value, str):
+        raise ValueError("must be a text")
+    return value
+
+
+def _one_of(value: Any, choices: tuple[Any, ...]) -> Any:
+    """`value` as the first of the types that it can be."""
+    if value is None and type(None) in choices:
+        return None
+    refusals = []
+    for choice in choices:
+        if choice is not type(None):
+            try:
+                return typed(value, choice)
+            except ValueError as error:
+                refusals.append(str(error))
+    raise ValueError(" or ".join(refusals))
+
+
+def _number(value: Any, kind: type) -> Any:
+    number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+    if number is None or (kind is int and not number.is_integer()):
+        raise ValueError(f"must be a {'whole number' if kind is int else 'number'}")
+    return kind(number)
+
+
+def _numbers(value: Any, hints: tuple[Any, ...]) -> Any:
+    endless = hints[-1] is Ellipsis  # tuple[float, ...]
+    if not isinstance(value, list | tuple) or not (endless or len(value) == len(hints)):
+        raise ValueError("must be a list of numbers" if endless else f"must be a list of {len(hints)} numbers")
+    return tuple(typed(number, hints[0]) for number in value)

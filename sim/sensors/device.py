@@ -1,0 +1,207 @@
+"""What gyro and accelerometer are made of alike: crooked axes, bandwidth, shaking, supply, curve and converter.
+
+    sensed  = curve((1 + gain_per_k rise) M signal) + bias + noise        M = (1 + gain + cross-axis) R_sb
+    reading = convert(supply(sensed))
+
+The signal of a tick is the mean over it of what has passed the part's low-pass filter, in body axes.  `R_sb` is
+the crooked mounting, unknown to the firmware: readings labelled body are components along the board's axes.
+
+Bandwidth.  First order, T y' = u - y with T = 1 / (2 pi bandwidth).  Integrated over a tick of length h:
+mean(y) = mean(u) - (y(h) - y(0)) T / h, exactly.  Within a tick u = m + d/2 P1(s) + q P2(s), the Legendre
+polynomials of s = t / h from 0 to 1, with m the mean, d the rise over the tick and q the bulge of its ends above
+the mean; y(h) = exp(-a) y(0) + J0 m + J1 d/2 + J2 q, a = h / T, with Jn the integral of a exp(-a (1 - s)) Pn(s).
+
+Supply (Premerlani & Bizard, "Gyro characteristics").  A part's output voltage is referred to a fixed voltage
+(absolute) or goes with the supply (ratiometric); so is the converter's.  Where the two differ, a supply wrong by
+the fraction e changes sensitivity and offset together: (x + null) times 1 + e or 1 / (1 + e), less the null.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import Array
+from estimator.jit import kernel
+from estimator.rotation import from_euler
+from sim.clock import Rates
+from sim.sensors.board import BoardParams
+from sim.sensors.noise import Source
+
+# In SI units of the reading.  A flag for each group, so that what is off costs nothing.
+DEVICE: tuple[Any, ...] = (
+    ("M", "f8", (3, 3)),  # body axes to readings
+    ("filters", "i8"),
+    ("low_pass", "f8", (5,)),  # exp(-a), J0, J1, J2, 1 / a
+    ("shakes", "i8"),
+    ("shake", "f8"),  # amplitude at the board's reference speed
+    ("shake_rad", "f8", (3,)),  # phase of each axis against the rotor
+    ("bandwidth_hz", "f8"),
+    ("conversions", "i8"),
+    ("distorts", "i8"),  # any of the terms from here to the converter
+    ("gain_per_k", "f8", (3,)),
+    ("bend", "f8", (3,)),  # largest deviation from the straight line
+    ("supply_power", "i8"),  # of 1 + e in the reading: 1, -1, or 0 where the supply does not matter
+    ("null", "f8"),
+    ("range", "f8"),
+    ("step", "f8"),
+    ("lowest", "f8"),  # steps
+    ("highest", "f8"),
+)
+MEMORY: tuple[Any, ...] = (
+    ("filtered", "f8", (3,)),  # output of the low-pass filter at the end of the tick
+    ("signal", "f8", (3,)),  # mean over the tick of what reaches the part's output
+)
+
+
+def axes(mounting_deg: tuple[float, float, float]) -> Array:
+    """R_sb of a board crooked by roll, pitch and yaw, shape (3, 3)."""
+    R_bs: Array = from_euler(*(math.radians(angle) for angle in mounting_deg))
+    return R_bs.T
+
+
+def low_pass(bandwidth_hz: float, dt_s: float) -> Array:
+    """Constants of the filter over a tick: exp(-a), J0, J1, J2, 1 / a; shape (5,).  See `step_filter`."""
+    a = 2.0 * math.pi * bandwidth_hz * dt_s
+    # Moments I_n, the integral of a exp(-a (1 - s)) s^n: by parts where a is large, else as a sum of positive terms.
+    if a > 1.0:
+        moments = [-math.expm1(-a)]
+        for n in (1, 2):
+            moments.append(1.0 - n / a * moments[-1])
+    else:
+        terms = [a**k / math.factorial(k) for k in range(20)]
+        moments = [a * math.exp(-a) * sum(term / (n + k + 1) for k, term in enumerate(terms)) for n in range(3)]
+    I0, I1, I2 = moments
+    return np.array([math.exp(-a), I0, 2.0 * I1 - I0, 6.0 * I2 - 6.0 * I1 + I0, 1.0 / a])
+
+
+def noise_of_one_conversion(density_sqrt_hz: float, bandwidth_hz: float, conversions: int, imu_hz: float) -> float:
+    """Sigma of one conversion under a one-sided noise density: over the filter's noise bandwidth, pi/2 times its own.
+
+    Without a filter, the density of a sample holds: the mean of n conversions has 1 / n of the power of one.
+    """
+    return density_sqrt_hz * math.sqrt(min(math.pi / 2.0 * bandwidth_hz, conversions * imu_hz / 2.0))
+
+
+def converter(step: float, full_scale: float, bits: int, conversions: int, sigma: float) -> tuple[float, float, float]:
+    """Step, lowest and highest level in steps, of the mean of some `conversions`; a step of 0 does not quantise.
+
+    `step` 0 is that of `bits` over +-`full_scale`.  Levels end with the codes, in two's complement, or with the
+    range.  The mean of n conversions has n times as many levels, but only where noise moves the conversions from
+    level to level: noise `sigma` of one above half a step (Microchip AN2572, DS00002572B, "Noise").  Less, and all
+    conversions agree: the mean is as coarse as one.
+    """
+    if not bits:
+        return 0.0, 0.0, 0.0
+    step = step or 2.0 * full_scale / 2**bits
+    codes, within = 2.0 ** (bits - 1), math.floor(full_scale / step * (1.0 + 1e-12))
+    finer = conversions if conversions > 1 and sigma > 0.5 * step else 1
+    return step / finer, -min(codes, within) * finer, min(codes - 1.0, within) * finer
+
+
+def make(
+    params: Any, board: BoardParams, rates: Rates, source: Source, unit: NDArray[np.void],
+    *, name: str, full_scale: float, step: float, null: float, shake: float, density_sqrt_hz: float,
+) -> None:  # fmt: skip
+    """Fill what is in DEVICE of `unit`, shape (1,), for the part `name`; the keywords are in SI units."""
+
+    def drawn(what: str, sigma: float, n: int = 3) -> Array:
+        return sigma * source(f"{name} {what}").standard_normal(n) if sigma else np.zeros(n)
+
+    M = np.diag(1.0 + drawn("gain", params.gain))
+    M[~np.eye(3, dtype=bool)] = drawn("cross-axis", params.cross_axis, 6)
+    unit["M"] = M @ axes(board.mounting_deg)
+    unit["bandwidth_hz"], unit["filters"] = params.bandwidth_hz, math.isfinite(params.bandwidth_hz)
+    if math.isfinite(params.bandwidth_hz):
+        unit["low_pass"] = low_pass(params.bandwidth_hz, rates.dt_s)
+    unit["shakes"], unit["shake"], unit["conversions"] = shake > 0.0, shake, params.conversions
+    if shake:
+        unit["shake_rad"] = source(f"{name} vibration").uniform(0.0, 2.0 * math.pi, 3)
+    unit["gain_per_k"] = drawn("gain temperature", params.gain_per_k)
+    if math.isfinite(full_scale):  # a fraction of no full scale is nothing
+        unit["bend"] = drawn("non-linearity", params.nonlinearity * full_scale)
+    unit["supply_power"] = board.supply_power(params.output)
+    unit["null"], unit["range"] = null, full_scale
+    unit["distorts"] = np.any(unit["gain_per_k"]) or np.any(unit["bend"]) or np.any(unit["supply_power"])
+    sigma = noise_of_one_conversion(density_sqrt_hz, params.bandwidth_hz, params.conversions, rates.imu_hz)
+    unit["step"], unit["lowest"], unit["highest"] = converter(step, full_scale, params.bits, params.conversions, sigma)
+
+
+@kernel
+def step_filter(weights, before, mean, rise, bulge):  # type: ignore[no-untyped-def]
+    """Output of the low-pass filter at the end of a tick, from that `before` it and the shape of the signal in it."""
+    return weights[0] * before + weights[1] * mean + weights[2] * 0.5 * rise + weights[3] * bulge
+
+
+@kernel
+def rate_shape(truth, k, i):  # type: ignore[no-untyped-def]
+    """Rise and bulge over tick k of the rate about axis i, from its mean and its values at both ends.
+
+    Before tick 0 there is no row: the rate then is taken as a straight line.
+    """
+    mean, end = truth[k].imu_omega_b_rad_s[i], truth[k].omega_b_rad_s[i]
+    start = truth[k - 1].omega_b_rad_s[i] if k > 0 else 2.0 * mean - end
+    return end - start, 0.5 * (start + end) - mean
+
+
+@kernel
+def mean_gain(turns, conversions):  # type: ignore[no-untyped-def]
+    """Mean of a sine over a tick of `turns` periods, against its value half-way.
+
+    Of conversions at the middles of equal parts: sin(n x) / (n sin x), x = pi turns / n (Dirichlet's kernel),
+    which is 1 for a single one, however fast the sine: it aliases.  0 conversions: the limit sin(x) / x.
+    """
+    if conversions == 0:
+        x = np.pi * turns
+        return np.sin(x) / x if x != 0.0 else 1.0
+    n = conversions
+    whole = np.rint(turns / n)
+    x = np.pi * (turns / n - whole)  # reduced first: exact where the sine meets the same phase at each conversion
+    sign = 1.0 if (whole * (n - 1)) % 2.0 == 0.0 else -1.0
+    return sign * np.sin(n * x) / (n * np.sin(x)) if x != 0.0 else sign
+
+
+@kernel
+def shake(unit, board, state, signal):  # type: ignore[no-untyped-def]
+    """Add to `signal`, shape (3,), the mean of the motor's vibration; `board`, `state` are its UNIT and MEMORY.
+
+    The amplitude of a rotor out of balance goes with the square of its speed; the filter is in its steady state.
+    """
+    ratio = state.rotor_hz / unit.bandwidth_hz
+    amplitude = unit.shake * (state.rotor_hz / board.shaken_at_hz) ** 2 / np.sqrt(1.0 + ratio * ratio)
+    amplitude *= mean_gain(state.rotor_hz * board.dt_s, unit.conversions)
+    for i in range(3):
+        signal[i] += amplitude * np.sin(state.rotor_rad + unit.shake_rad[i] - np.arctan(ratio))
+
+
+@kernel
+def distort(x, i, unit, state):  # type: ignore[no-untyped-def]
+    """Change of the gain with temperature and the curve of axis i, on what the axis senses, `x`.
+
+    The curve is the third Chebyshev polynomial T3 over the full scale: of all cubics the one whose best straight
+    line is zero, and whose deviation reaches its largest value, with either sign, four times.
+    """
+    x *= 1.0 + unit.gain_per_k[i] * state.warmer_k
+    if unit.bend[i] != 0.0:
+        z = min(max(x / unit.range, -1.0), 1.0)
+        x += unit.bend[i] * (4.0 * z * z - 3.0) * z
+    return x
+
+
+@kernel
+def on_supply(x, unit, state):  # type: ignore[no-untyped-def]
+    """What the converter finds of `x` when the supply is wrong."""
+    if unit.supply_power == 0:
+        return x
+    ratio = state.supply if unit.supply_power > 0 else 1.0 / state.supply
+    return (x + unit.null) * ratio - unit.null
+
+
+@kernel
+def quantise(x, unit):  # type: ignore[no-untyped-def]
+    """The level nearest to `x`, within the range and the codes."""
+    x = min(max(x, -unit.range), unit.range)
+    if unit.step == 0.0:
+        return x
+    return unit.step * min(max(np.floor(x / unit.step + 0.5), unit.lowest), unit.highest)

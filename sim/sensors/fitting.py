@@ -1,0 +1,195 @@
+"""Suites: which parts an aeroplane carries, and the board they sit on; every file ``suites/*.toml`` is one.
+
+    summary = "..."                     a line about it
+    gyro = "itg3200"                    a part by name, or a file of one's own: "my_gyro.toml", beside the suite's
+    accelerometer = "bma180"
+    gps = "ls20031"                     magnetometer, airspeed and barometer likewise, or not at all
+
+    [board]                             fields of BoardParams
+    lever_arm_b_m = [0.05, 0.0, 0.02]
+
+    [board.converter]                   reads the analogue parts
+    bits = 10
+    reference_v = 5.0
+
+    [changes]                           single figures, by dotted names
+    "accelerometer.bias_g" = 0.02
+
+A part ``generic`` has the defaults of its dataclass; a part ``perfect`` has no error.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+from sim.params import changed, near_misses
+from sim.sensors.accelerometer import AccelerometerParams
+from sim.sensors.air_data import AirspeedParams, BarometerParams
+from sim.sensors.board import BoardParams
+from sim.sensors.datasheet import KINDS, load_part, part_path, read_text, read_toml
+from sim.sensors.gps import GpsParams
+from sim.sensors.gyro import GyroParams
+from sim.sensors.magnetometer import MagnetometerParams
+from sim.sensors.noise import MOST_BITS
+
+FOLDER: Final = Path(__file__).parent / "suites"
+NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
+
+_ALWAYS = ("gyro", "accelerometer", "gps")  # no flight without
+_ANALOGUE = {"gyro": ("sensitivity_mv_deg_s", "step_deg_s"), "accelerometer": ("sensitivity_mv_g", "step_g")}
+
+
+@dataclass(frozen=True, slots=True)
+class SuiteParams:
+    """What is fitted, and how good each part is; None is not fitted."""
+
+    gyro: GyroParams = field(default_factory=GyroParams)
+    accelerometer: AccelerometerParams = field(default_factory=AccelerometerParams)
+    gps: GpsParams = field(default_factory=GpsParams)
+    magnetometer: MagnetometerParams | None = None
+    airspeed: AirspeedParams | None = None
+    barometer: BarometerParams | None = None
+    board: BoardParams = field(default_factory=BoardParams)
+
+
+def load_suite(name: str, files: Mapping[str, str] = NO_FILES) -> SuiteParams:
+    """The suite called `name`, or the one in a file, ``path/to/suite.toml``.
+
+    files : path -> text, read instead of the disk: what `own_files` gave when the flight was first flown
+
+    Raises
+    ------
+    ValueError      one line: no such suite (with the near misses) or file, or what is wrong in the file
+    """
+    file, data = _read(name, files)
+    return _fit(file, data, _folder(name), files)
+
+
+def own_files(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
+    """The text of every file of one's own that makes the suite `name`, by path; none for a suite from here."""
+    if not name.endswith(".toml"):
+        return {}
+    _, data = _read(name, files)
+    parts = [data[kind] for kind in KINDS if isinstance(data.get(kind), str)]
+    paths = [part_path(part, _folder(name)) for part in parts if part.endswith(".toml")]
+    kept = {str(path): read_text(path, files, "part") for path in paths}
+    return {name: read_text(Path(name), files, "sensor suite")} | kept
+
+
+def suite_parts(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
+    """What is in the suite `name` or in a file, as it is written there: kind -> part, and its summary."""
+    _, data = _read(name, files)
+    return {key: data[key] for key in ("summary", *KINDS) if key in data}
+
+
+class _Suites(Mapping[str, SuiteParams]):
+    """The suites that have a file here, each read when it is first asked for."""
+
+    def __getitem__(self, name: str) -> SuiteParams:
+        if name not in _suite_names():
+            raise KeyError(name)
+        return _loaded(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(_suite_names())
+
+    def __len__(self) -> int:
+        return len(_suite_names())
+
+
+SUITES: Final[Mapping[str, SuiteParams]] = _Suites()
+"""Every suite that can be named: name -> what is fitted."""
+
+
+@cache
+def _suite_names() -> tuple[str, ...]:
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+@cache
+def _loaded(name: str) -> SuiteParams:
+    return load_suite(name)
+
+
+def _read(name: str, files: Mapping[str, str]) -> tuple[str, dict[str, Any]]:
+    """What errors call the suite, and its contents."""
+    if name.endswith(".toml"):
+        return name, read_toml(name, read_text(Path(name), files, "sensor suite"))
+    if name not in _suite_names():
+        raise ValueError(
+            f"unknown sensor suite {name!r}: {near_misses(name, _suite_names())} (one's own: path/to/suite.toml)"
+        )
+    path = FOLDER / f"{name}.toml"
+    return path.name, read_toml(path.name, path.read_text(encoding="utf-8"))
+
+
+def _folder(name: str) -> Path | None:
+    return Path(name).parent if name.endswith(".toml") else None
+
+
+def _fit(file: str, data: Mapping[str, Any], folder: Path | None, files: Mapping[str, str]) -> SuiteParams:
+    known = ("summary", *KINDS, "board", "changes")
+    for key in data:
+        if key not in known:
+            raise ValueError(f"{file}: unknown key {key!r}: {near_misses(key, known)}")
+    if not isinstance(data.get("summary"), str):
+        raise ValueError(f"{file}: summary = {data.get('summary')!r}: must be a line of text")
+    board = dict(_table(file, "board", data))
+    converter = board.pop("converter", None)
+    devices = {kind: _device(file, kind, data.get(kind), folder, files) for kind in KINDS}
+    if converter is not None:
+        devices |= {kind: _read_by(file, kind, devices[kind], converter) for kind in _ANALOGUE}
+    try:
+        suite = SuiteParams(**devices, board=changed(BoardParams(), board, "board"))
+        return changed(suite, _table(file, "changes", data), "this suite")
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from None
+
+
+def _table(file: str, key: str, data: Mapping[str, Any]) -> Mapping[str, Any]:
+    table = data.get(key, {})
+    if not isinstance(table, dict):
+        raise ValueError(f"{file}: {key} = {table!r}: must be a section, [{key}]")
+    return table
+
+
+def _device(file: str, kind: str, name: Any, folder: Path | None, files: Mapping[str, str]) -> Any:
+    """Parameters of the part `name`, None where none is fitted."""
+    if name is None and kind not in _ALWAYS:
+        return None
+    if not isinstance(name, str):
+        said = f"{kind} is missing" if name is None else f"{kind} = {name!r}"
+        raise ValueError(f"{file}: {said}: must be the name of a part, or of a file of one's own")
+    try:
+        part = load_part(name, folder, files)
+    except ValueError as error:
+        raise ValueError(f"{file}: {kind}: {error}") from None
+    if kind not in part.devices:
+        raise ValueError(f"{file}: {kind} = {name!r}: that part has no {kind}, but {' and '.join(part.devices)}")
+    return part.devices[kind]
+
+
+def _read_by(file: str, kind: str, device: Any, converter: Any) -> Any:
+    """An analogue part read by the board's converter: one step is reference / 2^bits / sensitivity."""
+    if device.output == "digital":
+        return device
+    known = ("bits", "reference_v", "conversions")
+    if not isinstance(converter, dict) or not {"bits", "reference_v"} <= set(converter) <= set(known):
+        raise ValueError(
+            f"{file}: board.converter = {converter!r}: must have bits and reference_v, may have conversions"
+        )
+    bits, volts = converter["bits"], converter["reference_v"]
+    if isinstance(bits, bool) or bits not in range(1, MOST_BITS + 1):
+        raise ValueError(f"{file}: board.converter.bits = {bits!r} bit: choose a whole number from 1 to {MOST_BITS}")
+    if isinstance(volts, bool) or not isinstance(volts, int | float) or not 0.0 < volts < 1000.0:
+        raise ValueError(f"{file}: board.converter.reference_v = {volts!r} V: choose a number above 0")
+    sensitivity, step = _ANALOGUE[kind]
+    millivolts = getattr(device, sensitivity)
+    if not millivolts > 0.0:
+        raise ValueError(f"{file}: {kind}: an analogue part without {sensitivity} cannot be read by a converter")
+    step_value = 1000.0 * volts / 2**bits / millivolts
+    changes = {"bits": bits, step: step_value, "conversions": converter.get("conversions", device.conversions)}
+    return replace(device, **changes)
