@@ -32,7 +32,8 @@ from estimator.screening import (
     take_rate,
 )
 
-STATE_DTYPE = dtype_of((*BELIEF, *SCREEN))
+# In this order, because numba takes a record for a subtype of every one that begins like it, and says so aloud.
+STATE_DTYPE = dtype_of((*SCREEN, *BELIEF))
 WEAKEST_UT, STRONGEST_UT = 1.0, 1000.0  # outside it is no magnetic field of the earth, whatever iron is about
 
 AS_OURS = np.eye(3)

@@ -127,7 +127,8 @@ def test_power_up_takes_the_tilt_from_the_sample(make):
     estimator = make()
     estimator.reset(ImuSample(2.0, 0.02, np.zeros(3), force))
     estimate = estimator.update(Measurements.of(ImuSample(2.02, 0.02, np.zeros(3), force)))
-    np.testing.assert_allclose(estimate.R_eb[2] * -9.8, force, rtol=0, atol=1e-9)
+    single = make.__module__ == "estimator.peers"  # a package may compute in single precision
+    np.testing.assert_allclose(estimate.R_eb[2] * -9.8, force, rtol=0, atol=1e-6 if single else 1e-9)
 
 
 def test_register_own_class_enters_it_and_refuses_a_taken_name():
