@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | bench | aircraft | sensors | export | view``.
+"""The command line: ``wingslevel list | fly | check | compare | bench | aircraft | sensors | export | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -234,6 +234,57 @@ def check(
         if not whole:
             return INTERRUPTED
     return verdict.exit_code
+
+
+@app.command()
+def compare(
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
+    estimators: Annotated[
+        str | None, typer.Option("--estimators", metavar="A,B,C", help="What flies it; all there are by default.")
+    ] = None,
+    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds that each of them flies: 0-9 or 0,2,5-7.")] = "0-9",
+    wind: WindOption = None,
+    shear: ShearOption = None,
+    gust: GustOption = None,
+    turbulence: TurbulenceOption = None,
+    thermals: ThermalsOption = None,
+    aircraft: AircraftOption = None,
+    autopilot: AutopilotOption = None,
+    gps_rate: GpsRateOption = None,
+    imu_rate: ImuRateOption = None,
+    sensors: SensorsOption = None,
+    fault: FaultOption = None,
+    set_: SetOption = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it, as PNG, SVG or PDF.")] = None,
+    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")] = None,
+    json_: JsonOption = None,
+) -> int:
+    """Estimators side by side: each flies the scenario on the same seeds, through the same air and noise."""
+    from scenarios.harness import compare as comparing
+    from scenarios.harness import gate, handbook
+
+    with _reporting(json_) as report:
+        with usage():
+            for path in (picture, markdown):
+                _check_file(path)
+            handbook.check_picture(picture)
+            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
+            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
+            names = [name.strip() for name in (estimators or "").split(",") if name.strip()]
+            flown = comparing.prepare(scenario, names, gate.parse_seeds(seeds), changes)
+            console.warn_if_cold()
+            with console.progress("flying", "flights") as advance:
+                compared = comparing.fly(flown, workers or _processors(), advance)
+        if picture is not None:
+            from scenarios.harness import compare_picture
+
+            with usage():
+                compare_picture.draw(compared, picture)
+        _write(markdown, compared.to_markdown)
+        report(compared.to_json())
+        comparing.tell(compared)  # last: a reader who closes the pipe loses no report
+    return compared.exit_code
 
 
 @app.command()
