@@ -45,11 +45,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from estimator.interface import Array, HeadingReference, Instrument
-from estimator.peer import EAST_NORTH_UP, LEFT_UP, Keeping, Peer, PeerParams, package
+from estimator.peer import EAST_NORTH_UP, LEFT_UP, NORTH_WEST_UP, Heard, Keeping, Peer, PeerParams, package
 from estimator.screening import G_M_S2
 
-FIX_LIFE_S = 2.0  # an older course corrects nothing any more
-MIN_SPEED_M_S = 3.0  # a slower ground speed has no course
+NO_FORCE = np.zeros(3)
 SHORTEST_S = 5e-4  # sample interval that a package is told at least
 
 
@@ -65,11 +64,11 @@ class _Ahrs(Keeping):
     def _make(self) -> None:
         raise NotImplementedError
 
-    def _advance(self, gyro_b_rad_s: Array, force_b_m_s2: Array | None, row: Any, dt_s: float) -> Array:
-        gyro = self._body @ gyro_b_rad_s
+    def _advance(self, heard: Heard) -> Array:
         # No force at all is what they take for "no accelerometer": they integrate then.
-        force = np.zeros(3) if force_b_m_s2 is None else self._body @ force_b_m_s2
-        self._q = np.array(self._step(gyro, force, self._field(row), dt_s), np.float64)
+        force = NO_FORCE if heard.force_m_s2 is None else heard.force_m_s2
+        self._magnetic |= heard.field_ut is not None
+        self._q = np.array(self._step(heard.gyro_rad_s, force, heard.field_ut, heard.dt_s), np.float64)
         return self._q
 
     def _step(self, gyro: Array, force: Array, field: Array | None, dt_s: float) -> Any:
@@ -90,7 +89,7 @@ class MadgwickParams(PeerParams):
 class Madgwick(_Ahrs):
     """Madgwick's gradient descent, from the package ahrs."""
 
-    _earth = LEFT_UP
+    _earth = NORTH_WEST_UP
     params: MadgwickParams
 
     def __init__(self, params: MadgwickParams | None = None) -> None:
@@ -143,7 +142,7 @@ class Mahony(_Ahrs):
         return self._filter.updateMARG(self._q, gyro, force, field, dt_s)
 
     def _learnt(self) -> Array:
-        return np.asarray(self._body @ self._filter.b)
+        return np.asarray(self._filter.b)
 
     def _kept(self) -> tuple[Array, Array]:
         return self._q.copy(), self._filter.b.copy()
@@ -177,7 +176,8 @@ class Vqf(Keeping):
         self._filter: Any = None  # its interval is not known before the first sample
         self._q = q
         self._intervals_s = (0.0, 0.0)  # of gyro and accelerometer, of the magnetometer
-        self._field_at_s = -1.0
+        self._clock_s, self._field_at_s = 0.0, -1.0
+        self._magnetic = False
 
     def _make(self, imu_s: float, mag_s: float) -> None:
         """A filter for these intervals, in the state of the one before."""
@@ -187,47 +187,43 @@ class Vqf(Keeping):
         self._filter.state = {**self._filter.state, "gyrQuat": self._q} if before is None else before.state
         self._intervals_s = (imu_s, mag_s)
 
-    def _advance(self, gyro_b_rad_s: Array, force_b_m_s2: Array | None, row: Any, dt_s: float) -> Array:
+    def _advance(self, heard: Heard) -> Array:
+        self._clock_s += heard.dt_s
         if self._filter is None:
-            self._make(max(dt_s, SHORTEST_S), 0.0)
+            self._make(max(heard.dt_s, SHORTEST_S), 0.0)
         each_s = self._intervals_s[0]
-        times = max(1, round(dt_s / each_s))
-        gyro = self._body @ gyro_b_rad_s * (dt_s / (times * each_s))
+        times = max(1, round(heard.dt_s / each_s))
+        gyro = heard.gyro_rad_s * (heard.dt_s / (times * each_s))
         for _ in range(times):
             self._filter.updateGyr(gyro)
-            if force_b_m_s2 is not None:
-                self._filter.updateAcc(self._body @ force_b_m_s2)
-        self._take_field(row)
-        return np.asarray(self._filter.getQuat9D() if self._intervals_s[1] else self._filter.getQuat6D())
+            if heard.force_m_s2 is not None:
+                self._filter.updateAcc(heard.force_m_s2)
+        if heard.field_ut is not None:
+            self._take_field(heard.field_ut)
+        return np.asarray(self._filter.getQuat9D() if self._magnetic else self._filter.getQuat6D())
 
-    def _take_field(self, row: Any) -> None:
+    def _take_field(self, field_ut: Array) -> None:
         """Hand over the magnetometer's sample, from the second one on: then their interval is known."""
-        field = self._field(row)
-        if field is None:
-            return
         imu_s, mag_s = self._intervals_s
-        now_s = float(self._state["clock_s"][0])
         if not mag_s and self._field_at_s >= 0.0:
-            mag_s = max(now_s - self._field_at_s, imu_s)
-            self._make(imu_s, mag_s)
-        self._field_at_s = now_s
-        self._magnetic = mag_s > 0.0
-        if mag_s:
-            self._filter.updateMag(field)
+            self._make(imu_s, max(self._clock_s - self._field_at_s, imu_s))
+            self._magnetic = True
+        self._field_at_s = self._clock_s
+        if self._magnetic:
+            self._filter.updateMag(field_ut)
 
     def _learnt(self) -> Array:
-        return np.asarray(self._body @ self._filter.getBiasEstimate()[0])
+        return np.asarray(self._filter.getBiasEstimate()[0])
 
     def _kept(self) -> tuple[Any, ...]:
         state = None if self._filter is None else self._filter.state
-        return self._q.copy(), self._intervals_s, self._field_at_s, state
+        return self._q.copy(), self._intervals_s, self._clock_s, self._field_at_s, state
 
     def _keep(self, kept: tuple[Any, ...]) -> None:
-        q, intervals_s, field_at_s, state = kept
-        self._q, self._filter, self._field_at_s = q.copy(), None, field_at_s
-        self._intervals_s = intervals_s
+        self._q, self._intervals_s, self._clock_s, self._field_at_s, state = kept
+        self._filter = None
         if state is not None:
-            self._make(*intervals_s)
+            self._make(*self._intervals_s)
             self._filter.state = state
 
 
@@ -261,7 +257,6 @@ class Imufusion(Peer):
 
     def _start(self, q: Array, *, settled: bool) -> None:
         self._filter, self._told_interval = self._fusion.Ahrs(), False
-        self._course_deg, self._age_s = 0.0, math.inf
         if settled:
             self._filter.skip_startup()  # else it pulls hard for its first seconds
         self._filter.set_quaternion(q)
@@ -277,27 +272,19 @@ class Imufusion(Peer):
         self._filter.set_settings(settings)
         self._told_interval = True
 
-    def _advance(self, gyro_b_rad_s: Array, force_b_m_s2: Array | None, row: Any, dt_s: float) -> Array:
+    def _advance(self, heard: Heard) -> Array:
         if not self._told_interval:
-            self._set(1.0 / max(dt_s, SHORTEST_S))
-        self._filter.set_sample_period(dt_s)
-        gyro = np.degrees(gyro_b_rad_s)
-        force = np.zeros(3) if force_b_m_s2 is None else np.asarray(force_b_m_s2 / G_M_S2)  # NED: level is (0, 0, -1)
-        self._give(gyro, force, row, dt_s)
+            self._set(1.0 / max(heard.dt_s, SHORTEST_S))
+        self._filter.set_sample_period(heard.dt_s)
+        force_g = NO_FORCE if heard.force_m_s2 is None else heard.force_m_s2 / G_M_S2  # NED: level is (0, 0, -1)
+        self._give(np.degrees(heard.gyro_rad_s), force_g, heard)
         return np.asarray(self._filter.get_quaternion(), np.float64)
 
-    def _give(self, gyro_deg_s: Array, force_g: Array, row: Any, dt_s: float) -> None:
-        self._age_s += dt_s
-        if row["gps_new"]:
-            course, speed = float(row["gps_course_rad"]), float(row["gps_speed_m_s"])
-            if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0):
-                self._state["rejected"] += 1
-            elif speed >= MIN_SPEED_M_S:
-                self._course_deg, self._age_s = math.degrees(course), 0.0
-        if self._age_s <= FIX_LIFE_S:
-            self._filter.update_external_heading(gyro_deg_s, force_g, self._course_deg)
-        else:
+    def _give(self, gyro_deg_s: Array, force_g: Array, heard: Heard) -> None:
+        if heard.course_rad is None:
             self._filter.update_no_magnetometer(gyro_deg_s, force_g)
+        else:
+            self._filter.update_external_heading(gyro_deg_s, force_g, math.degrees(heard.course_rad))
 
 
 class Imufusion9D(Imufusion):
@@ -306,9 +293,9 @@ class Imufusion9D(Imufusion):
     heading_reference: HeadingReference = "nose"
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "magnetometer")
 
-    def _give(self, gyro_deg_s: Array, force_g: Array, row: Any, dt_s: float) -> None:  # noqa: ARG002 - as above
-        field = self._field(row)
-        if field is None:
+    def _give(self, gyro_deg_s: Array, force_g: Array, heard: Heard) -> None:
+        if heard.field_ut is None:
             self._filter.update_no_magnetometer(gyro_deg_s, force_g)
         else:
-            self._filter.update(gyro_deg_s, force_g, field)
+            self._magnetic = True
+            self._filter.update(gyro_deg_s, force_g, heard.field_ut)
