@@ -67,6 +67,11 @@ class Cost:
     update_ns: float
     replay_ns: float | None
 
+    @property
+    def ns(self) -> float:
+        """The less of the two."""
+        return self.update_ns if self.replay_ns is None else self.replay_ns
+
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
@@ -302,7 +307,7 @@ def _over_all(values: Sequence[Array], reduce: Callable[[Array], float]) -> floa
 
 
 _HEADINGS = (
-    "", "given", "flew", "inclination error\n  RMS    p95    max", "heading\n   RMS", "ns per\nupdate", "checks",
+    "", "given", "inclination error\n  RMS   p95   max", "heading\nRMS", "us per\nupdate", "lasted,\nchecks",
 )  # fmt: skip
 
 
@@ -315,8 +320,9 @@ def tell(comparison: Comparison) -> None:
     letters = ", ".join(f"{letter} {name}" for name, letter in LETTERS.items() if name in present)
     out.print(
         Text(
-            f"given: {letters}\nheading: c against the course over ground, n against the nose\n"
-            "ns: a whole log in one call; * update() in Python\nchecks: of the scenario, over all seeds",
+            f"given: {letters}\nerrors in degrees; heading: c against the course over ground, n against the nose\n"
+            "us per update: over a log in one call; * each update() called from Python\n"
+            "lasted: flights that did not end early; checks: of the scenario, passed over all seeds",
             "dim",
         )
     )
@@ -332,11 +338,8 @@ def tell(comparison: Comparison) -> None:
 def _row(e: Entrant) -> list[str]:
     """A line of the table: numbers that belong together in one cell, so that it fits 80 columns."""
     n = e.numbers
-    inclination = " ".join(
-        f"{console.number(n[f'inclination_{what}_deg']):>{width}}"
-        for what, width in (("rms", 5), ("p95", 6), ("max", 6))
-    )
+    inclination = f"{n['inclination_rms_deg']:5.2f} {n['inclination_p95_deg']:5.1f} {n['inclination_max_deg']:5.1f}"
+    heading = f"{n['heading_rms_deg']:.1f} {e.heading_reference[0]}"
     letters = "".join(LETTERS[name] for name in e.given)
-    spent = "" if e.cost is None else f"{e.cost.replay_ns or e.cost.update_ns:.0f}{'' if e.cost.replay_ns else '*'}"
-    heading = f"{console.number(n['heading_rms_deg'])} {e.heading_reference[0]}"
-    return [e.name, letters, f"{e.survived}/{len(e.flights)}", inclination, heading, spent, checks_text(e)]
+    spent = "" if e.cost is None else f"{e.cost.ns / 1000.0:.2f}{'' if e.cost.replay_ns else '*'}"
+    return [e.name, letters, inclination, heading, spent, f"{e.survived}/{len(e.flights)} {checks_text(e)}"]
