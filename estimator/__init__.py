@@ -43,6 +43,9 @@ from typing import TypeVar
 
 ESTIMATORS: dict[str, str] = {
     "premerlani": "estimator.premerlani:Premerlani",
+    "matrixpilot": "estimator.matrixpilot:MatrixPilot",
+    "ap_dcm": "estimator.ap_dcm:ApDcm",
+    "ap_dcm_2013": "estimator.ap_dcm:ApDcm2013",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
     "peer_madgwick": "estimator.peers:Madgwick",

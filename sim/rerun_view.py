@@ -145,7 +145,8 @@ def _stream(manifest: Mapping[str, Any], recording_id: str | None) -> "rr.Record
     rec = rr.RecordingStream("wingslevel", recording_id=recording_id, send_properties=False)
     rec.set_log_time_enabled(False)
     scenario, estimator = setting(manifest, "scenario", "flight"), setting(manifest, "estimator", "estimator")
-    rec.send_recording_name(f"{scenario}, {estimator}, seed {setting(manifest, 'seed', 0)}")
+    seed = setting(manifest, "seed")
+    rec.send_recording_name(f"{scenario}, {estimator}" + ("" if seed is None else f", seed {seed}"))
     return rec
 
 

@@ -16,7 +16,8 @@ def story(flight: Flight) -> str:
     """What was flown and how it went, as Markdown."""
     manifest = flight.manifest
     names = [setting(manifest, name) for name in ("scenario", "aircraft", "estimator", "autopilot")]
-    what = ", ".join([*(str(name) for name in names if name), f"seed {setting(manifest, 'seed', 0)}"])
+    seed = setting(manifest, "seed")
+    what = ", ".join([*(str(name) for name in names if name), *([] if seed is None else [f"seed {seed}"])])
     end_s = float(flight.log.truth["t_s"][-1]) - flight.release_s if len(flight.log) else 0.0
     how = flight.outcome.replace("_", " ").capitalize() + f" at {end_s:.1f} s"
     lines = [f"## {what}", "", how + (f": {flight.message}. " if flight.message else ". ") + _air(manifest), ""]
@@ -28,7 +29,8 @@ def story(flight: Flight) -> str:
             passed = "passed" if row["passed"] else "**FAILED**"
             lines.append(f"| {row['name']} | {measured} | {row.get('sense', '<=')} {limit} | {passed} |")
     lines += ["", f"Heading is judged against the true {flight.heading_reference}.", ""]
-    lines += ["Orange is the truth, blue the estimate, green a sensor, grey a demand."]
+    orange = setting(manifest, "reference", "the truth")  # of a replayed log: whatever attitude it holds
+    lines += [f"Orange is {orange}, blue the estimate, green a sensor, grey a demand."]
     return "\n".join(lines)
 
 

@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | compare | bench | aircraft | sensors | export | view``.
+"""The command line: ``wingslevel list | fly | check | compare | replay | bench | aircraft | sensors | export | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -18,6 +18,25 @@ from typing import Annotated, Any
 import typer
 
 from scenarios.harness import console
+from scenarios.harness.cli_options import (
+    AircraftOption,
+    AutopilotOption,
+    EstimatorOption,
+    FaultOption,
+    GpsRateOption,
+    GustOption,
+    ImuRateOption,
+    JsonOption,
+    MarkdownOption,
+    SensorsOption,
+    SetOption,
+    ShearOption,
+    ThermalsOption,
+    TurbulenceOption,
+    WebOption,
+    WindOption,
+    WorkersOption,
+)
 from scenarios.harness.console import INTERRUPTED, USAGE
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
@@ -30,64 +49,6 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-EstimatorOption = Annotated[
-    str | None, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
-]
-WindOption = Annotated[
-    str | None,
-    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm."),
-]
-ShearOption = Annotated[
-    str | None,
-    typer.Option("--shear", metavar="EXP", help="Growth of the wind with height: 0 none, 0.14 open country."),
-]
-GustOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; repeat it."
-    ),
-]
-TurbulenceOption = Annotated[
-    str | None,
-    typer.Option("--turbulence", metavar="W20", help="calm, light, moderate, severe, or the wind at 20 ft, m/s."),
-]
-ThermalsOption = Annotated[
-    str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
-]
-AircraftOption = Annotated[str | None, typer.Option("--aircraft", help="Name of an aircraft.")]
-AutopilotOption = Annotated[
-    str | None, typer.Option("--autopilot", help="Registered name, module:Class or file.py:Class.")
-]
-GpsRateOption = Annotated[
-    float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.")
-]
-ImuRateOption = Annotated[
-    int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
-]
-SensorsOption = Annotated[
-    str | None, typer.Option("--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.")
-]
-FaultOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fault",
-        metavar="FAULT",
-        help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
-        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
-        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
-        "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
-        "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
-    ),
-]
-JsonOption = Annotated[
-    str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
-]
-WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
 
 
 def main() -> None:
@@ -206,9 +167,9 @@ def check(
     sensors: SensorsOption = None,
     fault: FaultOption = None,
     set_: SetOption = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
+    workers: WorkersOption = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
-    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")] = None,
+    markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
     """The gate for CI: fly scenarios on many seeds, judge each flight and all of them pooled."""
@@ -255,9 +216,9 @@ def compare(
     sensors: SensorsOption = None,
     fault: FaultOption = None,
     set_: SetOption = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
+    workers: WorkersOption = None,
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it, as PNG, SVG or PDF.")] = None,
-    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")] = None,
+    markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
     """Estimators side by side: each flies the scenario on the same seeds, through the same air and noise."""
@@ -285,6 +246,52 @@ def compare(
         report(compared.to_json())
         comparing.tell(compared)  # last: a reader who closes the pipe loses no report
     return compared.exit_code
+
+
+@app.command()
+def replay(
+    log: Annotated[Path, typer.Argument(help="Recording of ours, .csv, .mat, .bin, .ulg, or reference vectors.")],
+    estimator: Annotated[
+        str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
+    ] = "premerlani",
+    reference: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
+    ] = None,
+    columns: Annotated[
+        str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+    ] = None,
+    calibration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]"),
+    ] = None,
+    airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
+    settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,
+    out: Annotated[Path, typer.Option(help="Folder for the recordings.")] = FLIGHTS,
+    no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
+    json_: JsonOption = None,
+) -> int:
+    """Run estimators over a recorded log and score them against the attitude that it holds."""
+    from scenarios.harness import replaying
+    from scenarios.harness.replay import Window
+
+    with _reporting(json_) as report:
+        with usage():
+            told = replaying.run(
+                log,
+                [name.strip() for name in estimator.split(",") if name.strip()],
+                out,
+                reference=reference,
+                columns=columns,
+                params=_changes(set_),
+                window=Window(airborne, settle, calibration),
+                rerun=not no_rerun,
+            )
+        report(told.to_json())
+        replaying.tell(told)  # last: a reader who closes the pipe loses no file
+    return told.exit_code
 
 
 @app.command()

@@ -166,7 +166,8 @@ def _names(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> Non
             )  # fmt: skip
     ax.set_title("Estimator", pad=15)
     ax.text(0.995, 1.0, "was given", transform=ax.transAxes, fontsize=7.8, color=FAINT, ha="right", va="bottom")
-    meaning = "  ".join(f"{letter} {name}" for name, letter in LETTERS.items())
+    meaning = "   ".join(f"{letter} {name}" + "\n" * (letter == "P") for name, letter in LETTERS.items())
+    meaning = meaning.replace("\n   ", "\n")
     ax.text(0.0, -0.06, meaning, transform=ax.transAxes, fontsize=7.0, color=FAINT, va="top")
 
 

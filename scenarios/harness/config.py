@@ -214,12 +214,12 @@ def _put(data: dict[str, Any], name: str, value: Any) -> None:
     if not rest:
         data[head] = value
     elif head in ("estimator_params", "sensors"):
-        data[head] = {**data[head], rest: _literal(value)}
+        data[head] = {**data[head], rest: literal(value)}
     else:
         data[head] = {**data[head], rest: value}
 
 
-def _literal(value: Any) -> Any:
+def literal(value: Any) -> Any:
     """Number, truth value or list that `value` spells, else the text itself."""
     if not isinstance(value, str):
         return value

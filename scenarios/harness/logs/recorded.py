@@ -1,8 +1,10 @@
 """What every reader of logs returns: measured rows, and the reference attitude that the log holds."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from estimator.interface import Array
@@ -24,6 +26,11 @@ class Reference:
     kind: Literal["truth", "filter", "firmware"]
     name: str
 
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Rows that have an attitude, shape (N,)."""
+        return np.asarray(np.isfinite(self.R_eb).all(axis=(1, 2)))
+
 
 @dataclass(frozen=True, slots=True)
 class RecordedLog:
@@ -32,6 +39,8 @@ class RecordedLog:
     rows : shape (N,), MEASURED_DTYPE, times increasing
     name : of the file            instruments : those that the log has
     reference : or None           repairs : what was repaired and how often, a line each
+    place : latitude and longitude of the origin of positions, degrees, where known
+    suits : what is known of the instruments aboard, as parameters of estimators, ``{"gps_latency_s": 0.2}``
     """
 
     rows: NDArray[Any]
@@ -39,3 +48,5 @@ class RecordedLog:
     instruments: tuple[str, ...]
     reference: Reference | None = None
     repairs: tuple[str, ...] = ()
+    place: tuple[float, float] | None = None
+    suits: Mapping[str, float] = field(default_factory=dict)

@@ -1,0 +1,250 @@
+"""What may be wrong in a log, whatever its format: mended and counted, or refused with the row and the column.
+
+Mended: rows without a number in time, gyro or accelerometer, and rows of zeros before the first reading, are left
+out, GPS fixes, magnetic and air samples without a number too; rows late by up to a second are sorted,
+repeated times left out; times in milli-, micro- or nanoseconds, rates in degrees and forces in g are converted.
+Told: gaps.  Refused: a column without a number, a clock that runs back, more rows bad than good, an accelerometer
+with the opposite sign, whatever is no inertial unit's at all.
+
+Units are judged by what cannot be otherwise.  See `rate_factor` for the gyro.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import Array
+from estimator.screening import G_M_S2, GYRO_RANGE_RAD_S, LONGEST_GAP_S
+from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.witnesses import witnesses
+
+LATEST_S = 1.0  # a row later than this is not late: the clock was set, or two logs are in one file
+FASTEST_HZ = 20_000.0
+BUSIEST_RAD_S = 3.0  # no aeroplane turns faster for half of a log
+FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
+_CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
+_DEGREES = 180.0 / np.pi
+_ARRIVALS = (
+    ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s")),
+    ("mag_new", "magnetic samples", ("mag_b_ut",)),
+    ("air_new", "air-data samples", ("airspeed_m_s",)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """How a log's own words name a place in it: its file, its names of our quantities, its number of a row."""
+
+    path: Path
+    columns: Mapping[str, str] = field(default_factory=dict)
+    row: Callable[[int], str] = lambda k: f"row {k + 1}"
+
+    def column(self, quantity: str) -> str:
+        """The file's own name of `quantity`."""
+        own = self.columns.get(quantity, quantity)
+        return f"column {own}" if own == quantity else f"column {own} ({quantity})"
+
+    def refusal(self, k: int | None, quantity: str, why: str) -> LogError:
+        """The error that names the file, the row `k` and the column."""
+        at = "" if k is None else f"{self.row(k)}, "
+        return LogError(f"{self.path}: {at}{self.column(quantity)}: {why}")
+
+
+def clock_factor(t_s: Array, source: Source, repairs: list[str]) -> float:
+    """Factor to seconds: an inertial unit that samples every second or more slowly is one whose unit is another."""
+    good = np.sort(t_s[np.isfinite(t_s)])
+    steps = np.diff(good)
+    step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    for least, name, factor in _CLOCKS:
+        if step >= least:
+            repairs.append(f"{source.column('time')} in {name}, not seconds: converted")
+            return factor
+    return 1.0
+
+
+def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list[str]) -> NDArray[np.intp]:
+    """Rows to keep, in order of time.
+
+    Parameters
+    ----------
+    t_s : shape (N,)          numbers : our name -> shape (N,), columns in which a row must have a number
+    repairs : lines are added to it
+
+    Raises
+    ------
+    LogError      a column without a number, more bad rows than good ones, or a clock that runs back
+    """
+    n = len(t_s)
+    good = np.ones(n, np.bool_)
+    for name, values in {"time": t_s, **numbers}.items():
+        bad = ~np.isfinite(values)
+        if n == 0 or bad.all():
+            raise source.refusal(None, name, f"no number in {n} rows")
+        if bad.any():
+            first = int(np.flatnonzero(bad)[0])
+            repairs.append(f"{source.column(name)}: {bad.sum()} without a number left out, first {source.row(first)}")
+            good &= ~bad
+    empty = np.logical_and.accumulate(np.all([values == 0.0 for values in numbers.values()], axis=0))
+    if empty.any():
+        repairs.append(f"{empty.sum()} rows of zeros before the first reading left out, first {source.row(0)}")
+        good &= ~empty
+    if 2 * good.sum() < n:
+        first = int(np.flatnonzero(~good)[0])
+        raise LogError(f"{source.path}: {n - good.sum()} of {n} rows lack a number, the first is {source.row(first)}")
+    keep = np.flatnonzero(good)
+    steps = np.diff(t_s[keep])
+    late = np.flatnonzero(steps < 0.0)
+    for k in late[steps[late] < -LATEST_S][:1]:
+        why = f"runs back from {t_s[keep[k]]:g} to {t_s[keep[k + 1]]:g} s: a clock that was set, or two logs in one"
+        raise source.refusal(int(keep[k + 1]), "time", why)
+    if len(late):
+        first_row = source.row(int(keep[late[0] + 1]))
+        repairs.append(f"{source.column('time')}: {len(late)} out of order, sorted; first {first_row}")
+        keep = keep[np.argsort(t_s[keep], kind="stable")]
+    again = np.flatnonzero(np.diff(t_s[keep]) == 0.0) + 1
+    if 2 * len(again) >= len(keep):
+        raise source.refusal(int(keep[again[0]]), "time", f"{len(again)} of {len(keep)} rows repeat the time before")
+    if len(again):
+        first_row = source.row(int(keep[again[0]]))
+        repairs.append(f"{source.column('time')}: {len(again)} repeated, left out; first {first_row}")
+        keep = np.delete(keep, again)
+    return keep
+
+
+def mended(log: RecordedLog, path: Path) -> RecordedLog:
+    """`log` as some reader gave it, with its rows put in order, and judged; see the module.
+
+    Raises
+    ------
+    LogError      one line with the file, the row and the column
+    """
+    source, repairs = Source(path), list(log.repairs)
+    rows, reference = log.rows, log.reference
+    vectors = {"gyro": rows["gyro_b_rad_s"], "force": rows["force_b_m_s2"]}
+    numbers = {f"{name}.{axis}": v[:, i] for name, v in vectors.items() for i, axis in enumerate("xyz")}
+    keep = kept(rows["t_s"], numbers, source, repairs)
+    if len(keep) < len(rows) or np.any(np.diff(keep) != 1):
+        moved = rows[keep]
+        in_order = np.all(np.diff(keep) > 0)
+        for name, _, _ in _ARRIVALS if in_order else ():  # what arrived with a row left out arrives with the next
+            so_far = np.concatenate(([0], np.cumsum(rows[name])))[keep + 1]
+            moved[name] = np.diff(so_far, prepend=0) > 0
+        rows = moved
+        if reference is not None:
+            reference = replace(reference, R_eb=reference.R_eb[keep])
+    return judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
+
+
+def judged(log: RecordedLog, source: Source) -> RecordedLog:
+    """`log`, whose rows are in order, with intervals where it has none and units as they must be; its gaps told.
+
+    Raises
+    ------
+    LogError      what no inertial unit would report
+    """
+    rows, repairs = log.rows.copy(), list(log.repairs)
+    _fill_intervals(rows, source, repairs)
+    _check_arrivals(rows, repairs)
+    _check_force(rows, source, repairs)
+    factor = rate_factor(rows, log.reference)
+    if factor != 1.0:
+        says = "degrees per second, not rad/s" if factor < 1.0 else "rad/s, not degrees per second"
+        repairs.append(f"{source.column('gyro')} in {says}: converted")
+        rows["gyro_b_rad_s"] *= factor
+    _note_field(rows, source, repairs)
+    rows.flags.writeable = False
+    return replace(log, rows=rows, repairs=tuple(repairs))
+
+
+def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:
+    """Set ``dt_s`` where there is none; tell of gaps."""
+    if len(rows) < 2:
+        raise source.refusal(None, "time", "a log of one row")
+    steps = np.diff(rows["t_s"])
+    usual = float(np.median(steps))
+    if not 1.0 / FASTEST_HZ <= usual <= LONGEST_GAP_S:
+        why = f"{usual:g} s from row to row; an inertial unit samples every {1.0 / FASTEST_HZ:g} to {LONGEST_GAP_S} s"
+        raise source.refusal(None, "time", why)
+    steps = np.concatenate(([usual], steps))
+    unknown = ~(rows["dt_s"] > 0.0)
+    rows["dt_s"][unknown] = np.where(steps > LONGEST_GAP_S, usual, steps)[unknown]
+    said = np.where(unknown, usual, rows["dt_s"])
+    lost = np.round(steps / said) - 1.0
+    short = (steps > 1.5 * said) & (steps <= LONGEST_GAP_S)
+    if short.any():
+        repairs.append(f"{lost[short].sum():.0f} samples lost, the next stands for them; first {_at(rows, short)}")
+    long = np.flatnonzero(steps > LONGEST_GAP_S)
+    if len(long):
+        k = int(long[np.argmax(steps[long])])
+        repairs.append(f"{len(long)} gaps longer than {LONGEST_GAP_S} s, the longest {steps[k]:.1f} s "
+                       f"until {rows['t_s'][k]:.2f} s")  # fmt: skip
+
+
+def _check_arrivals(rows: NDArray[Any], repairs: list[str]) -> None:
+    """What arrived without a number in it did not arrive."""
+    for new, what, columns in _ARRIVALS:
+        broken = rows[new] > 0
+        broken &= ~np.all([np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns], axis=0)
+        if broken.any():
+            repairs.append(f"{broken.sum()} {what} without a number left out, first {_at(rows, broken)}")
+            rows[new][broken] = 0
+
+
+def _at(rows: NDArray[Any], where: NDArray[np.bool_]) -> str:
+    return f"at {rows['t_s'][np.argmax(where)]:.2f} s"
+
+
+def _check_force(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:
+    """Half the time and more an aeroplane feels about its weight, and feels it downwards."""
+    length = float(np.median(np.linalg.norm(rows["force_b_m_s2"], axis=1)))
+    if 0.5 < length < 2.5:
+        repairs.append(f"{source.column('force')} in g, not m/s^2: converted")
+        rows["force_b_m_s2"] *= G_M_S2
+    elif not 0.5 * G_M_S2 < length < 2.5 * G_M_S2:
+        raise source.refusal(None, "force", f"{length:g} m/s^2 is its median; an aeroplane feels about {G_M_S2:.1f}")
+    z = float(np.median(rows["force_b_m_s2"][:, 2]))
+    if z > 0.5 * G_M_S2:
+        why = (
+            f"{z:.1f} m/s^2 is the median of z; specific force is {-G_M_S2:.1f} when level: give the force a minus "
+            "sign in the map, or, where the axes are forward, left, up, y and z of gyro and force"
+        )
+        raise source.refusal(None, "force", why)
+
+
+def rate_factor(rows: NDArray[Any], reference: Reference | None) -> float:
+    """Factor to rad/s: 1, or that between degrees and radians where the gyro is off by just that.
+
+    Two kinds of evidence, neither of which the log of an aeroplane in the right unit can give.
+
+    *Witnesses.*  What else in the log turns (`witnesses.witnesses`: the reference, the magnetic field, the course,
+    the direction of the specific force) is correlated with what the gyro says (above 0.7), and the gyro says 25 to
+    130 times as much, around the 57.3 between the two units.  A correlation needs turning, so an aeroplane at rest
+    says nothing; and a gyro in the right unit would have to overstate every turn 25 times, in step with it.  The
+    first witness that speaks decides.
+
+    *Range*, where none speaks.  One reading in a hundred beyond 2100 degrees a second, which no part in use reaches,
+    or half of them beyond 3 rad/s: no aeroplane turns once round in two seconds for half of a log.
+    """
+    for seen, said in witnesses(rows, reference):
+        together = float(np.sum(seen * said))
+        squared = float(np.sum(seen**2)) * float(np.sum(said**2))
+        if seen.size < FEWEST or np.sum(seen**2) < LEAST_RAD**2 or not together > 0.7 * np.sqrt(squared):
+            continue
+        ratio = together / float(np.sum(seen**2))
+        if 25.0 < ratio < 130.0:
+            return 1.0 / _DEGREES
+        return _DEGREES if 25.0 < 1.0 / ratio < 130.0 else 1.0
+    rates = np.linalg.norm(rows["gyro_b_rad_s"], axis=1)
+    beyond = np.percentile(rates, 99.0) > GYRO_RANGE_RAD_S or np.median(rates) > BUSIEST_RAD_S
+    return 1.0 / _DEGREES if beyond else 1.0
+
+
+def _note_field(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:
+    """A field that is not the earth's is kept, since its direction is what counts, and told."""
+    field_ut = np.linalg.norm(rows["mag_b_ut"][rows["mag_new"] > 0], axis=1)
+    if len(field_ut) and not 10.0 < np.median(field_ut) < 250.0:
+        repairs.append(f"{source.column('mag')}: {np.median(field_ut):.3g} uT is not the earth's field; kept as it is")

@@ -1,0 +1,319 @@
+"""Estimators over a recorded log: run, scored against the attitude that the log holds, recorded like a flight.
+
+Each estimator gets all rows in order.  It powers up with the mean inertial sample of the first seconds where the
+aeroplane was at rest in them, else as in the air; against what an original firmware printed for reference vectors
+always as in the air, as that firmware did.
+
+Judged are the rows with a reference while airborne (GPS ground speed above a limit; all of a log without GPS), after
+a time to settle.  Against firmware every row counts: two runs of one algorithm agree from the first sample on.
+"""
+
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import Array, AttitudeEstimator, ImuSample, Measurements
+from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
+from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
+from scenarios.harness import console
+from scenarios.harness.config import literal
+from scenarios.harness.logs.recorded import RecordedLog
+from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
+from scenarios.harness.plugins import heading_reference_of, load_estimator
+from sim.acceptance import FlightCodeFailed, estimate_of
+from sim.events import events_of
+from sim.log import Event, Flight, Log, Outcome, Phase
+from sim.oracle import Oracle
+from sim.params import changed
+
+CALIBRATION_S = 2.0
+STILL_M_S, STILL_M_S2 = 2.0, 0.7  # faster over the ground, or shaken more than this (sigma), is not at rest
+BLOCK = 5000  # rows between two steps of the bar, where an estimator is called row by row
+_UNKNOWN = (
+    "omega_b_rad_s",
+    "imu_omega_b_rad_s",
+    "imu_force_b_m_s2",
+    "wind_e_m_s",
+    "gyro_bias_b_rad_s",
+    "force_bias_b_m_s2",
+    "alpha_rad",
+    "beta_rad",
+)  # fmt: skip - what no log tells of the truth
+SCORES = (
+    "inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg", "heading_rms_deg",
+    "rotation_rms_deg", "rotation_max_deg",
+)  # fmt: skip
+SHARE_S, REPEATS = 0.3, 7  # the time is the least of several runs, while they take no longer than this
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Which rows are judged, and how an estimator powers up.
+
+    airborne_m_s : ground speed above which the aeroplane flies      settle_s : left out after it first did
+    calibration_s : at the start, averaged for the power-up if at rest; None is 2 s, or 0 against firmware
+    """
+
+    airborne_m_s: float = 5.0
+    settle_s: float = 10.0
+    calibration_s: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, unit in (("airborne_m_s", "m/s"), ("settle_s", "s"), ("calibration_s", "s")):
+            value = getattr(self, name)
+            if value is not None and not 0.0 <= value < math.inf:
+                raise ValueError(f"{name} = {value:g} {unit}: must be zero or more")
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """One estimator over a log.
+
+    flown : shape (N,), its estimates        first : the first row that it saw
+    ns_per_update : of the run; NaN where it failed        rejected : ticks in which it did not believe something,
+    None where it does not say               failure : one line, empty where it did not fail
+    """
+
+    estimator: str
+    heading_reference: str
+    log: Log
+    first: int
+    ns_per_update: float
+    rejected: int | None
+    scores: Mapping[str, float]
+    failure: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """The numbers, named with their units; None where there is nothing to measure."""
+        numbers = {**self.scores, "ns_per_update": self.ns_per_update}
+        plain: dict[str, Any] = {name: v if math.isfinite(v) else None for name, v in numbers.items()}
+        failure = {"failure": self.failure} if self.failure else {}
+        return {**plain, "rejected": self.rejected, "heading_reference": self.heading_reference, **failure}
+
+
+def make(spec: str, params: Mapping[str, Any]) -> AttitudeEstimator:
+    """The estimator of that name with some of its parameters changed.
+
+    Raises
+    ------
+    ValueError      one line: no such estimator or parameter; the oracle, for which no log holds the truth
+    """
+    estimator = load_estimator(spec)
+    if isinstance(estimator, Oracle):
+        raise ValueError("the oracle reads the truth from a simulator: it cannot be replayed over a log")
+    if not params:
+        return estimator
+    before = getattr(estimator, "params", None)
+    if not is_dataclass(before):
+        raise ValueError(f"estimator {spec!r} has no parameters (a dataclass in its attribute params)")
+    values = {name.removeprefix("estimator_params."): literal(value) for name, value in params.items()}
+    return type(estimator)(changed(before, values, f"estimator {spec}"))  # type: ignore[call-arg]
+
+
+def suited(spec: str, suits: Mapping[str, float]) -> dict[str, float]:
+    """Those of a log's `suits` that the estimator `spec` has parameters for."""
+    if not suits:
+        return {}
+    params = getattr(load_estimator(spec), "params", None)
+    return {name: value for name, value in suits.items() if hasattr(params, name)}
+
+
+def replay(
+    log: RecordedLog,
+    spec: str,
+    params: Mapping[str, Any] | None = None,
+    window: Window | None = None,
+    advance: console.Advance = lambda _done, _total: None,
+) -> Replayed:
+    """Run the estimator `spec` over `log` and score it.
+
+    params : by name; what the log says of its instruments (`RecordedLog.suits`) holds where they do not
+
+    Raises
+    ------
+    ValueError      one line: no such estimator or parameter, or a calibration longer than the log
+    """
+    window = window or Window()
+    estimator = make(spec, {**suited(spec, log.suits), **(params or {})})
+    n = _calibration(log, window)
+    on_ground = at_rest(log.rows[:n]) if n else None
+    first = n if on_ground is not None else 0
+    flown = Log.empty(len(log.rows))
+    _truth_of(log, flown.truth)
+    flown.measured[:] = log.rows
+    failure, ns_per_update = "", math.nan
+    try:
+        ns_per_update = _run(estimator, on_ground, log.rows, first, flown.flown, advance)
+    except FlightCodeFailed as failed:
+        failure = str(failed)
+        flown.flown["R_eb"] = np.where(np.isfinite(flown.flown["R_eb"]), flown.flown["R_eb"], np.eye(3))
+    judged = judged_rows(log, window, first)
+    scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
+    return Replayed(
+        spec.rpartition(":")[2],
+        heading_reference_of(estimator),
+        flown,
+        first,
+        ns_per_update,
+        getattr(estimator, "rejected", None),
+        scores,
+        failure,
+    )
+
+
+def at_rest(rows: NDArray[Any]) -> ImuSample | None:
+    """Mean inertial sample of `rows` where they are of something that stood or was held; None else.
+
+    The limits are those within which estimators take a mean sample for one at rest, and no GPS that says otherwise.
+    """
+    gyro, force = rows["gyro_b_rad_s"].mean(axis=0), rows["force_b_m_s2"].mean(axis=0)
+    still = float(np.abs(gyro).max()) < AT_REST_RAD_S
+    still &= abs(float(np.linalg.norm(force)) / G_M_S2 - 1.0) < AT_REST_G
+    still &= float(rows["force_b_m_s2"].std(axis=0).max()) < STILL_M_S2
+    fixed = rows["gps_valid"] > 0
+    still &= float(rows["gps_speed_m_s"][fixed].max(initial=0.0)) < STILL_M_S
+    return ImuSample(float(rows["t_s"][-1]), float(rows["dt_s"].sum()), gyro, force) if still else None
+
+
+def judged_rows(log: RecordedLog, window: Window, first: int = 0) -> NDArray[np.bool_]:
+    """Rows that are judged, shape (N,); see the module."""
+    rows, reference = log.rows, log.reference
+    if reference is None:
+        return np.zeros(len(rows), np.bool_)
+    judged = reference.known
+    if reference.kind == "firmware":
+        return judged
+    if "gps" in log.instruments:
+        judged &= (rows["gps_valid"] > 0) & (rows["gps_speed_m_s"] > window.airborne_m_s)
+    judged &= np.arange(len(rows)) >= first
+    if judged.any():
+        judged &= rows["t_s"] > rows["t_s"][np.argmax(judged)] + window.settle_s
+    return judged
+
+
+def score(R_eb: Array, log: RecordedLog, judged: NDArray[np.bool_]) -> dict[str, float]:
+    """Differences from the reference over the rows `judged`, degrees; NaN where there are none.
+
+    The heading is compared with the reference's nose, where its nose is not near the vertical.
+    """
+    if log.reference is None:
+        return dict.fromkeys(SCORES, math.nan)
+    ours, theirs = R_eb[judged], log.reference.R_eb[judged]
+    inclination = np.degrees(inclination_error_rad(ours, theirs))
+    rotation = np.degrees(rotation_error_rad(ours, theirs))
+    heading = np.degrees(heading_error_rad(ours, theirs))[np.abs(theirs[:, 2, 0]) < STEEPEST_R_ZX]
+    values = rms(inclination), p95(inclination), highest(inclination), rms(heading), rms(rotation), highest(rotation)
+    return dict(zip(SCORES, values, strict=True))
+
+
+def as_flight(log: RecordedLog, replayed: Replayed, window: Window) -> Flight:
+    """The replay as a flight, for the recorder and the viewer: the reference where the truth would be."""
+    t_s = log.rows["t_s"]
+    start_s = float(t_s[0] - log.rows["dt_s"][0])
+    outcome = Outcome.ESTIMATOR_FAILED if replayed.failure else Outcome.COMPLETED
+    reference = log.reference.name if log.reference else "nothing: the log has no attitude"
+    events = events_of(replayed.log, outcome, replayed.failure)
+    events += tuple(Event(start_s, line, "warn") for line in log.repairs)
+    manifest: dict[str, Any] = {
+        "scenario": f"replay of {log.name}",
+        "estimator": replayed.estimator,
+        "reference": reference,
+        "instruments": log.instruments,
+        "repairs": log.repairs,
+        "scores": replayed.to_json(),
+        "settle_s": window.settle_s,
+        "airborne_m_s": window.airborne_m_s,
+    }
+    if log.place is not None:
+        manifest["launch_latitude_deg"], manifest["launch_longitude_deg"] = log.place
+    return Flight(
+        replayed.log,
+        float(np.median(log.rows["dt_s"])),
+        start_s,
+        outcome,
+        "nose",  # a log's reference has a nose; its course is that of the same GPS
+        replayed.failure,
+        tuple(sorted(events, key=lambda event: event.t_s)),
+        manifest,
+    )
+
+
+def _calibration(log: RecordedLog, window: Window) -> int:
+    """How many rows the calibration takes."""
+    seconds = window.calibration_s
+    if seconds is None:
+        firmware = log.reference is not None and log.reference.kind == "firmware"
+        seconds = 0.0 if firmware else CALIBRATION_S
+    rows = log.rows
+    n = int(np.searchsorted(rows["t_s"], rows["t_s"][0] - rows["dt_s"][0] + seconds + 1e-6, side="right"))
+    if seconds > 0.0 and n >= len(rows):
+        if window.calibration_s is None:
+            return 0
+        raise ValueError(f"calibration_s = {seconds:g} s: the log is {rows['t_s'][-1] - rows['t_s'][0]:.1f} s long")
+    return n if seconds > 0.0 else 0
+
+
+def _run(
+    estimator: AttitudeEstimator,
+    on_ground: ImuSample | None,
+    rows: NDArray[Any],
+    first: int,
+    flown: NDArray[Any],
+    advance: console.Advance,
+) -> float:
+    """Fill `flown` from row `first` on; returns nanoseconds an update."""
+    total = len(rows)
+    if not hasattr(estimator, "replay"):
+        _reset(estimator, on_ground)
+        began = time.perf_counter()
+        for k in range(first, total):
+            estimate_of(estimator, Measurements(rows, k), flown, k)
+            if k % BLOCK == 0:
+                advance(k, total)
+        return 1e9 * (time.perf_counter() - began) / (total - first)
+    _reset(estimator, on_ground)
+    estimator.replay(rows[first : first + 1])  # compiles, where that has not been done
+    spent, least = 0.0, math.inf
+    for i in range(REPEATS):
+        _reset(estimator, on_ground)
+        began = time.perf_counter()
+        estimates = estimator.replay(rows[first:])
+        took = time.perf_counter() - began
+        spent, least = spent + took, min(least, took)
+        advance(i + 1, REPEATS)
+        if spent > SHARE_S:
+            break
+    for name in estimates.dtype.names:
+        flown[name][first:] = estimates[name]
+    return 1e9 * least / (total - first)
+
+
+def _reset(estimator: AttitudeEstimator, on_ground: ImuSample | None) -> None:
+    reset = getattr(estimator, "reset", None)
+    if reset is not None:
+        reset(on_ground)
+
+
+def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:
+    """Fill the table of the truth with what a log knows of it: the reference attitude, and the way by GPS."""
+    rows, n = log.rows, len(log.rows)
+    truth["t_s"] = rows["t_s"]
+    truth["phase"] = Phase.FLYING
+    for name in _UNKNOWN:
+        truth[name] = np.nan
+    truth["airspeed_m_s"] = np.where(rows["air_new"] > 0, rows["airspeed_m_s"], np.nan)
+    truth["R_eb"] = np.eye(3)
+    if log.reference is not None:
+        known = log.reference.known
+        if known.any():  # the last known attitude, before the first one that
+            last = np.maximum.accumulate(np.where(known, np.arange(n), -1))
+            truth["R_eb"] = log.reference.R_eb[np.where(last < 0, np.argmax(known), last)]
+    fixes = np.flatnonzero(rows["gps_new"])
+    for table, measured in (("p_e_m", "gps_p_e_m"), ("v_e_m_s", "gps_v_e_m_s")):
+        for i in range(3 if len(fixes) else 0):
+            truth[table][:, i] = np.interp(rows["t_s"], rows["t_s"][fixes], rows[measured][fixes, i])

@@ -1,0 +1,148 @@
+"""`wingslevel replay`: what it prints, writes and returns."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenarios.harness.cli import run
+from sim import recording
+
+DATA = Path(__file__).parents[1] / "reference" / "data" / "ap_ahrs_dcm"
+NUMBERS = {
+    "inclination_rms_deg", "inclination_max_deg", "heading_rms_deg", "rotation_rms_deg", "rotation_max_deg",
+    "ns_per_update",
+}  # fmt: skip
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch) -> Path:
+    """A working directory with a flight of 20 s in it."""
+    monkeypatch.chdir(tmp_path)
+    run(["fly", "turns_180", "--duration", "20", "--no-rerun", "--out", "flown", "--seed", "1"])
+    return tmp_path
+
+
+def test_replay_of_a_recording_is_told_written_and_recorded(here: Path, capsys) -> None:
+    """One table of 80 columns, one recording for each estimator, for the viewer too."""
+    capsys.readouterr()
+    code = run(
+        ["replay", "flown/turns_180-premerlani-seed1", "--estimator", "premerlani,gyro_only", "--json", "r.json"]
+    )
+    out = capsys.readouterr().out
+    assert code == 0
+    assert "against     the true attitude" in out
+    assert re.search(r"^ premerlani( +\d+\.\d\d){6} +\d+ *$", out, re.M)
+    assert max(len(line.rstrip()) for line in out.partition("recording")[0].splitlines()) <= 80
+    data = json.loads((here / "r.json").read_text())
+    assert list(data["estimators"]) == ["premerlani", "gyro_only"]
+    assert all(numbers.keys() >= NUMBERS for numbers in data["estimators"].values())
+    assert not NUMBERS & data.keys()
+    for numbers in data["estimators"].values():
+        folder = here / numbers["recording"]
+        assert (folder / "flight.rrd").stat().st_size > 10_000
+        assert recording.load(folder).manifest["scores"]["rotation_rms_deg"] == numbers["rotation_rms_deg"]
+
+
+def test_replay_json_of_one_estimator_has_its_numbers_at_the_top(here: Path, capfd) -> None:
+    """What it believed aboard is what the recording says: the scores are those of the flight itself."""
+    capfd.readouterr()
+    assert run(["replay", "flown/turns_180-premerlani-seed1", "--settle", "0", "--no-rerun", "--json", "-"]) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert data.keys() >= NUMBERS
+    flown = recording.load(here / "flown" / "turns_180-premerlani-seed1").log
+    judged = flown.measured["gps_speed_m_s"] > 5.0
+    cosine = np.einsum("nij,nij->n", flown.flown["R_eb"], flown.truth["R_eb"])[judged] / 2.0 - 0.5
+    angle_deg = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    # The first judged row is left out: times count after it.  Round-off of the arc cosine near one is 1e-6 degrees.
+    assert data["rotation_max_deg"] == pytest.approx(angle_deg[1:].max(), rel=0, abs=1e-5)
+    assert data["rotation_rms_deg"] == pytest.approx(np.sqrt(np.mean(angle_deg[1:] ** 2)), rel=0, abs=1e-5)
+
+
+def test_replay_of_reference_vectors_counts_every_row_against_firmware(tmp_path: Path, monkeypatch, capfd) -> None:
+    """The file of the firmware decides what is compared; the whole 130 s are judged."""
+    monkeypatch.chdir(tmp_path)
+    firmware = str(DATA / "A50_ap2013_gps.csv.gz")
+    code = run(["replay", str(DATA / "A50_in.csv.gz"), "--reference", firmware, "--no-rerun", "--json", "-"])
+    data = json.loads(capfd.readouterr().out)
+    assert code == 0
+    assert (data["reference"], data["reference_kind"]) == ("A50_ap2013_gps", "firmware")
+    assert data["judged_s"] == pytest.approx(130.0, rel=0, abs=1e-6)
+
+
+def test_replay_of_a_table_by_a_column_map_with_parameters(here: Path, capfd) -> None:
+    """The flight as text in degrees and milliseconds gives the same scores; a parameter gives others."""
+    log = recording.load(here / "flown" / "turns_180-premerlani-seed1").log
+    m, R = log.measured, log.truth["R_eb"].reshape(-1, 9)
+    columns = {
+        "ms": 1e3 * m["t_s"], "new": m["gps_new"], "v": m["gps_speed_m_s"], "cog": np.degrees(m["gps_course_rad"]),
+        **{f"w{i}": np.degrees(m["gyro_b_rad_s"][:, i]) for i in range(3)},
+        **{f"f{i}": m["force_b_m_s2"][:, i] for i in range(3)},
+        **{f"r{k // 3}{k % 3}": R[:, k] for k in range(9)},
+    }  # fmt: skip
+    units = {"ms": "time ms", "new": "gps.new", "v": "gps.speed m/s", "cog": "gps.course deg"}
+    units |= {f"w{i}": f"gyro.{a} deg/s" for i, a in enumerate("xyz")}
+    units |= {f"f{i}": f"force.{a}" for i, a in enumerate("xyz")} | {n: n for n in columns if re.match(r"r\d\d", n)}
+    rows = [",".join(columns), *(",".join(map(repr, row)) for row in np.column_stack(list(columns.values())).tolist())]
+    (here / "own.csv").write_text("\n".join(rows))
+    (here / "own.toml").write_text("\n".join(["[columns]", *(f'{n} = "{unit}"' for n, unit in units.items())]))
+    capfd.readouterr()
+    found = []
+    for arguments in (
+        ["flown/turns_180-premerlani-seed1"],
+        ["own.csv", "--columns", "own.toml"],
+        ["own.csv", "--columns", "own.toml", "--set", "w_rp=0.05"],
+    ):
+        assert run(["replay", *arguments, "--no-rerun", "--json", "-"]) == 0
+        found.append(json.loads(capfd.readouterr().out))
+    ours, table, other = (data["rotation_rms_deg"] for data in found)
+    assert table == pytest.approx(ours, rel=0, abs=1e-6)  # the intervals are differences of times: off by round-off
+    assert other != pytest.approx(ours, rel=0, abs=1e-3)
+    assert found[1]["repairs"] == []
+
+
+def test_replay_tells_what_it_repaired(here: Path, capsys) -> None:
+    """A gyro in degrees is named on the terminal and in the JSON."""
+    log = recording.load(here / "flown" / "turns_180-premerlani-seed1").log.measured
+    numbers = np.column_stack((log["t_s"], np.degrees(log["gyro_b_rad_s"]), log["force_b_m_s2"]))
+    np.savetxt(here / "deg.csv", numbers, delimiter=",", header="t,gx,gy,gz,ax,ay,az", comments="")
+    assert run(["replay", "deg.csv", "--no-rerun", "--json", "r.json"]) == 0
+    assert "repaired    column gx gy gz (gyro) in degrees per second" in capsys.readouterr().out
+    data = json.loads((here / "r.json").read_text())
+    assert len(data["repairs"]) == 1
+    assert (data["reference"], data["rotation_rms_deg"]) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["none.csv"], "no log at none.csv"),
+        (["bad.csv"], "bad.csv: line 3, column gx: 'x' is no number"),
+        (["bad.csv", "--columns", "nothing"], "no column map 'nothing'"),
+        (["bad.csv", "--estimator", "premerlany"], "unknown estimator 'premerlany': did you mean premerlani?"),
+        (["bad.csv", "--estimator", "gyro_only,gyro_only"], "name each one once"),
+        (["bad.csv", "--set", "gain=2"], "unknown parameter 'gain' of estimator premerlani"),
+        (["bad.csv", "--settle", "-1"], "settle_s = -1 s: must be zero or more"),
+    ],
+)
+def test_replay_that_cannot_be_is_one_line_and_exit_code_2(tmp_path, monkeypatch, capsys, arguments, said) -> None:
+    """Found before anything is written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.csv").write_text(
+        "t,gx,gy,gz,ax,ay,az\n0.02,0,0,0,0,0,-9.8\n0.04,x,0,0,0,0,-9.8\n0.06,0,0,0,0,0,-9.8\n"
+    )
+    assert run(["replay", *arguments]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
+
+
+def test_replay_of_an_estimator_that_fails_is_exit_code_1(here: Path, capsys) -> None:
+    """A fault of one's own estimator is a result: one line, and the recording is kept."""
+    Path("own.py").write_text("class Clumsy:\n    def update(self, m):\n        return 1 / 0\n", encoding="utf-8")
+    assert run(["replay", "flown/turns_180-premerlani-seed1", "--estimator", "own.py:Clumsy", "--no-rerun"]) == 1
+    assert re.search(r"Clumsy failed: Clumsy at 0\.02 s: ZeroDivisionError", capsys.readouterr().out)
+    assert (here / "flights" / "replay_turns_180-premerlani-seed1-Clumsy" / "flight.parquet").is_file()

@@ -1,0 +1,232 @@
+"""Estimators over a log: the same as in flight, powered up as they should be, judged where they should be."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from estimator.interface import MEASURED_DTYPE, AttitudeEstimate
+from estimator.premerlani import Premerlani
+from scenarios.harness import logs
+from scenarios.harness.flight import fly_scenario
+from scenarios.harness.logs.recorded import RecordedLog, Reference
+from scenarios.harness.registry import find
+from scenarios.harness.replay import Window, as_flight, at_rest, judged_rows, make, replay, score
+from sim import recording
+from sim.log import Outcome
+
+DATA = Path(__file__).parents[1] / "reference" / "data"
+HAND, AIR = "hand_launch", "turns_180"
+
+
+class Called:
+    """The DCM estimator behind `update` alone, as a person's own class has it."""
+
+    heading_reference = "course"
+
+    def __init__(self):
+        self._dcm = Premerlani()
+        self.reset = self._dcm.reset
+
+    def update(self, m):
+        return self._dcm.update(m)
+
+
+class Broken:
+    """Answers with something that is no rotation from 3 s on."""
+
+    def update(self, m):
+        return AttitudeEstimate(np.eye(3) * (1.0 if m.imu.t_s < 3.0 else 2.0))
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory):
+    """A short hand launch and a short flight that starts in the air: as flown, and read from their recordings."""
+    found = {}
+    for name in (HAND, AIR):
+        flight = fly_scenario(find(name), {"duration_s": 12.0}, seed=2)
+        folder = recording.save(flight, tmp_path_factory.mktemp(name) / "flight")
+        found[name] = flight, logs.read(folder)
+    return found
+
+
+def rest(n=200):
+    """Four seconds level at rest, with a fix that says so."""
+    rows = np.zeros(n, MEASURED_DTYPE)
+    rows["t_s"], rows["dt_s"] = 0.02 * np.arange(1, n + 1), 0.02
+    rows["force_b_m_s2"] = [0.0, 0.0, -9.8]
+    rows["gps_valid"], rows["gps_new"] = 1, 1
+    return rows
+
+
+@pytest.mark.parametrize("name", [HAND, AIR])
+def test_replay_of_a_flight_is_what_was_flown_bit_for_bit(flights, name):
+    """The estimator believes of the recording what it believed aboard, calibration in the hand included."""
+    flight, log = flights[name]
+    replayed = replay(log, "premerlani")
+    assert replayed.first == (100 if name == HAND else 0)
+    for column in ("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "health"):
+        got, flown = replayed.log.flown[column], flight.log.flown[column]
+        np.testing.assert_array_equal(got[replayed.first :], flown[replayed.first :])
+    assert replayed.rejected == 0
+    assert replayed.ns_per_update > 0.0
+
+
+def test_replay_called_row_by_row_is_the_same(flights):
+    """An estimator without a replay of its own is called as in flight."""
+    _, log = flights[HAND]
+    called = replay(log, f"{__file__}:Called")
+    compiled = replay(log, "premerlani")
+    np.testing.assert_array_equal(called.log.flown["R_eb"], compiled.log.flown["R_eb"])
+    assert called.rejected is None
+
+
+def test_replay_parameters_reach_the_estimator(flights):
+    """Changed by name, as text; unknown ones are refused with those that come near."""
+    assert make("premerlani", {"gps_latency_s": "0.6", "turn_speed": "true"}).params.turn_speed is True
+    with pytest.raises(ValueError, match="unknown parameter 'gps_lateny_s' of estimator premerlani: did you mean gps"):
+        make("premerlani", {"gps_lateny_s": "0.6"})
+    with pytest.raises(ValueError, match="has no parameters"):
+        make("gyro_only", {"gain": "1"})
+    with pytest.raises(ValueError, match="oracle reads the truth"):
+        make("oracle", {})
+
+
+def test_replay_takes_what_the_log_says_of_its_instruments(flights):
+    """Where the estimator has such a parameter, and nobody says otherwise."""
+    _, log = flights[AIR]
+    knows = replace(log, suits={"gps_latency_s": 1.0, "no_parameter_of_anything": 3.0})
+    told = replay(log, "premerlani", {"gps_latency_s": 1.0})
+    found = replay(knows, "premerlani")
+    assert found.scores == told.scores
+    assert found.scores != replay(log, "premerlani").scores
+    assert replay(knows, "premerlani", {"gps_latency_s": 0.3}).scores == replay(log, "premerlani").scores
+    assert not replay(knows, "gyro_only").failure
+
+
+def test_replay_of_an_estimator_that_fails_says_so_and_is_recorded(flights, tmp_path):
+    """No scores, one line with class, time and fault, and a recording that says it too."""
+    _, log = flights[AIR]
+    replayed = replay(log, f"{__file__}:Broken")
+    assert replayed.failure.startswith("Broken at 3.00 s: R_eb is no rotation")
+    assert np.isnan(list(replayed.scores.values())).all()
+    flight = as_flight(log, replayed, Window())
+    assert flight.outcome == Outcome.ESTIMATOR_FAILED
+    recording.save(flight, tmp_path)
+
+
+def test_score_of_known_rotations_is_their_angles():
+    """Tilts and turns made with SciPy come back as inclination, heading and rotation."""
+    rows = rest(3)
+    reference = Rotation.from_euler("ZYX", [[40, 10, 20], [120, -30, 0], [-70, 5, -60]], degrees=True)
+    turned = (
+        Rotation.from_euler("z", [[3], [-4], [12]], degrees=True) * reference
+    )  # about the earth's down: heading alone
+    log = RecordedLog(rows, "log", (), Reference(reference.as_matrix(), "truth", "t"))
+    every = np.ones(3, np.bool_)
+    found = score(turned.as_matrix(), log, every)
+    expected = {"inclination_rms_deg": 0.0, "heading_rms_deg": 13.0 / np.sqrt(3.0), "rotation_max_deg": 12.0}
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=0, abs=1e-9)
+    level = Rotation.from_euler("z", [[40], [120], [-70]], degrees=True)
+    leaning = level * Rotation.from_euler("x", [[6], [-8], [24]], degrees=True)  # bank alone
+    log = replace(log, reference=Reference(level.as_matrix(), "truth", "t"))
+    found = score(leaning.as_matrix(), log, every)
+    assert found["inclination_rms_deg"] == pytest.approx(26.0 / np.sqrt(3.0), rel=0, abs=1e-9)
+    assert found["inclination_max_deg"] == pytest.approx(24.0, rel=0, abs=1e-9)
+    assert found["rotation_rms_deg"] == pytest.approx(26.0 / np.sqrt(3.0), rel=0, abs=1e-9)
+    assert found["heading_rms_deg"] == pytest.approx(0.0, rel=0, abs=1e-9)
+
+
+def test_judged_are_airborne_rows_after_settling():
+    """On the ground nothing is judged, nor where there is no reference, nor while it settles."""
+    rows = rest(1000)
+    rows["gps_speed_m_s"][200:800] = 12.0
+    R_eb = np.tile(np.eye(3), (1000, 1, 1))
+    R_eb[600] = np.nan
+    log = RecordedLog(rows, "log", ("gyro", "accelerometer", "gps"), Reference(R_eb, "truth", "t"))
+    judged = np.flatnonzero(judged_rows(log, Window(settle_s=2.0)))
+    assert judged.tolist() == [k for k in range(301, 800) if k != 600]
+    assert not judged_rows(log, Window(airborne_m_s=13.0)).any()
+    assert not judged_rows(replace(log, reference=None), Window()).any()
+
+
+def test_judged_are_all_rows_without_gps_after_settling_and_all_against_firmware():
+    """A bench log has no flight in it; two runs of one algorithm agree from the first row on."""
+    log = RecordedLog(
+        rest(), "log", ("gyro", "accelerometer"), Reference(np.tile(np.eye(3), (200, 1, 1)), "truth", "t")
+    )
+    assert judged_rows(log, Window(settle_s=1.0)).sum() == 200 - 51
+    firmware = replace(log, reference=replace(log.reference, kind="firmware"))
+    assert judged_rows(firmware, Window(settle_s=1.0), first=100).all()
+
+
+def test_power_up_at_rest_takes_the_mean_and_in_the_air_nothing():
+    """Turning, shaken, felt too heavy or moving over the ground is not at rest."""
+    rows = rest()
+    rows["gyro_b_rad_s"] = [0.01, -0.02, 0.03]
+    sample = at_rest(rows)
+    np.testing.assert_allclose(sample.gyro_b_rad_s, [0.01, -0.02, 0.03], rtol=1e-12)
+    for column, value in (("gyro_b_rad_s", 0.9), ("force_b_m_s2", [0.0, 0.0, -13.0]), ("gps_speed_m_s", 9.0)):
+        moved = rows.copy()
+        moved[column] = value
+        assert at_rest(moved) is None
+    rows["force_b_m_s2"][::2, 0] = 2.0
+    assert at_rest(rows) is None
+
+
+def test_power_up_is_in_the_air_against_firmware_and_as_told(flights):
+    """Reference vectors of a firmware start as it did; --calibration decides where it is given."""
+    folder = DATA / "ap_ahrs_dcm"
+    truth = logs.read(folder / "A50_in.csv.gz")
+    firmware = logs.read(folder / "A50_in.csv.gz", reference=folder / "A50_ap2013_gps.csv.gz")
+    assert replay(truth, "premerlani").first == 100
+    assert replay(firmware, "premerlani").first == 0
+    assert replay(firmware, "premerlani", window=Window(calibration_s=1.0)).first == 50
+    assert replay(truth, "premerlani", window=Window(calibration_s=0.0)).first == 0
+    with pytest.raises(ValueError, match=r"calibration_s = 1000 s: the log is 130\.0 s long"):
+        replay(truth, "premerlani", window=Window(calibration_s=1000.0))
+
+
+def test_window_refuses_what_cannot_be():
+    """One line with the name, the value and the unit."""
+    with pytest.raises(ValueError, match="settle_s = -1 s: must be zero or more"):
+        Window(settle_s=-1.0)
+
+
+def test_flight_of_a_replay_shows_reference_and_gps_track(flights, tmp_path):
+    """The reference where the truth would be, the way between the fixes; it can be replayed again, to the same."""
+    _, log = flights[AIR]
+    replayed = replay(log, "premerlani")
+    flight = as_flight(log, replayed, Window())
+    np.testing.assert_array_equal(flight.log.truth["R_eb"], log.reference.R_eb)
+    fixes = np.flatnonzero(log.rows["gps_new"])
+    np.testing.assert_allclose(flight.log.truth["p_e_m"][fixes], log.rows["gps_p_e_m"][fixes], rtol=0, atol=1e-9)
+    again = replay(logs.read(recording.save(flight, tmp_path / "again")), "premerlani")
+    np.testing.assert_array_equal(again.log.flown["R_eb"], replayed.log.flown["R_eb"])
+
+
+def test_replay_without_reference_has_no_scores(flights):
+    """Nothing to score against is no failure."""
+    _, log = flights[AIR]
+    replayed = replay(replace(log, reference=None), "gyro_only")
+    assert np.isnan(list(replayed.scores.values())).all()
+    assert replayed.to_json()["inclination_rms_deg"] is None
+    assert not replayed.failure
+
+
+@pytest.mark.skipif("WINGSLEVEL_DATA" not in os.environ, reason="WINGSLEVEL_DATA names no folder with thor75.mat")
+def test_replay_of_a_real_flight_stays_near_the_filter_aboard():
+    """University of Minnesota, 360 s in wind, a quarter of it banked above 30 degrees.
+
+    The map of these logs knows the receiver.  Speed and course over ground leave 4.2 degrees of inclination RMS
+    against the filter aboard (2.6 with the airspeed in their place), an accelerometer taken at its word 23.
+    """
+    log = logs.read(Path(os.environ["WINGSLEVEL_DATA"]) / "thor75.mat")
+    assert log.rows["gps_new"].sum() == 674
+    assert log.repairs == ("1 rows of zeros before the first reading left out, first row 1",)
+    dcm = replay(log, "premerlani")
+    assert dcm.scores["inclination_rms_deg"] <= 4.5
+    assert replay(log, "accelerometer_only").scores["inclination_rms_deg"] >= 15.0
