@@ -21,6 +21,8 @@ from scenarios.harness import console
 from scenarios.harness.cli_options import (
     AircraftOption,
     AutopilotOption,
+    CalibrationOption,
+    ColumnsOption,
     EstimatorOption,
     FaultOption,
     GpsRateOption,
@@ -28,6 +30,7 @@ from scenarios.harness.cli_options import (
     ImuRateOption,
     JsonOption,
     MarkdownOption,
+    ReferenceOption,
     SensorsOption,
     SetOption,
     ShearOption,
@@ -254,19 +257,12 @@ def replay(
     estimator: Annotated[
         str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
     ] = "premerlani",
-    reference: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
-    ] = None,
-    columns: Annotated[
-        str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")
-    ] = None,
+    reference: ReferenceOption = None,
+    columns: ColumnsOption = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
     ] = None,
-    calibration: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]"),
-    ] = None,
+    calibration: CalibrationOption = None,
     airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
     settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,
     out: Annotated[Path, typer.Option(help="Folder for the recordings.")] = FLIGHTS,

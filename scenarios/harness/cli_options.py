@@ -64,3 +64,11 @@ JsonOption = Annotated[
 WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
 WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")]
 MarkdownOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")]
+CalibrationOption = Annotated[
+    float | None,
+    typer.Option(metavar="S", help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]"),
+]
+ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")]
+ReferenceOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
+]

@@ -7,7 +7,7 @@ measurements of one short flight.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter_ns
 from typing import Any
@@ -18,7 +18,7 @@ from rich.text import Text
 from estimator import ESTIMATORS
 from estimator.interface import Array, HeadingReference, Measurements
 from scenarios.harness import console
-from scenarios.harness.config import FlightConfig, override
+from scenarios.harness.config import FlightConfig
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.flight import fly_config, fly_scenario
 from scenarios.harness.gate import fly_each
@@ -244,7 +244,8 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None]) -> Compar
     # Seed by seed, so that an interruption leaves each estimator about as many flights as the others.
     tasks = [Task(plan.named, seed, name, plan.changes) for seed in plan.seeds for name in plan.names]
     done = fly_each(tasks, workers, advance, lambda flown: flown.verdict.outcome == Outcome.INTERRUPTED)
-    costs = _costs(plan) if len(done) == len(tasks) else {}
+    failed = {tasks[i].estimator for i in done if done[i].verdict.outcome == Outcome.ESTIMATOR_FAILED}
+    costs = _costs(plan, failed) if len(done) == len(tasks) else {}
     entrants = []
     for name in plan.names:
         flights = tuple(done[i] for i in sorted(done) if tasks[i].estimator == name)
@@ -265,11 +266,13 @@ def given(estimator: object, config: FlightConfig) -> tuple[str, ...]:
     return tuple(name for name in getattr(estimator, "uses", _UNKNOWN) if name in fitted)
 
 
-def _costs(plan: Plan) -> dict[str, Cost]:
-    """What an update of each costs, over the measurements of the first seconds of a flight of the first of them."""
-    config = override(plan.config, {"duration_s": TIMED_S})
+def _costs(plan: Plan, failed: Container[str]) -> dict[str, Cost]:
+    """What an update of each that did not fail costs, over the measurements of the first seconds of a flight."""
+    another = {"duration_s": TIMED_S, "estimator": "premerlani", "estimator_params": {}}
+    config = plan.config.model_copy(update=another)
     rows = fly_config(plan.scenario, config).log.measured
-    return {name: cost(name, rows) for name in plan.names if name != "oracle"}  # which only a flight can ask
+    # The oracle answers in a flight alone.
+    return {name: cost(name, rows) for name in plan.names if name not in failed and name != "oracle"}
 
 
 def cost(name: str, rows: np.ndarray) -> Cost:
