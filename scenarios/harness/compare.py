@@ -318,7 +318,7 @@ def tell(comparison: Comparison) -> None:
     """The table, what its letters mean, and the flights that did not end as planned."""
     out = console.out()
     rows = [_row(entrant) for entrant in comparison.entrants]
-    out.print(console.table(title(comparison), _HEADINGS, rows, text=(0, 1)))
+    out.print(console.table(title(comparison), _HEADINGS, rows, text=(0, 1), wrapping=(0,)))
     present = dict.fromkeys(name for e in comparison.entrants for name in e.given)
     letters = ", ".join(f"{letter} {name}" for name, letter in LETTERS.items() if name in present)
     out.print(

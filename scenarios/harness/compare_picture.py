@@ -21,12 +21,13 @@ from scenarios.harness.metrics import Series, p95, rms
 
 COLOURS = (
     BLUE, ORANGE, GREEN, VIOLET, RED, TEAL, "#8c6d31", "#d6479a", "#5b6f8f", "#9aa61f", "#17a0c4", "#a0522d",
-    "#6a51a3", "#e39802", "#2f6b4f", "#b83b5e",
+    "#6a51a3", "#e39802", "#2f6b4f", "#b83b5e", "#444e57", "#00a676",
 )  # fmt: skip
 WIDTH = 14.0
 LEAST_DEG = 0.03  # what is less is drawn here
 TICKS_DEG = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 45.0, 90.0, 180.0)
 BIN_S = 1.0
+MANY = 8  # more lines than these are drawn thin, smoother and without shades
 
 
 def draw(comparison: Comparison, path: Path) -> None:
@@ -46,7 +47,7 @@ def draw(comparison: Comparison, path: Path) -> None:
         _heading(figure, comparison, height)
         _over_time(figure.add_subplot(upper[0]), flown, colours)
         _spread(figure.add_subplot(upper[1]), flown, colours)
-        lower = rows[1].subgridspec(1, 4, width_ratios=(1.5, 2.3, 2.3, 1.5), wspace=0.06)
+        lower = rows[1].subgridspec(1, 4, width_ratios=(1.85, 2.2, 2.2, 1.5), wspace=0.06)
         names, inclination, heading, cost = (figure.add_subplot(lower[i]) for i in range(4))
         _names(names, flown, colours)
         _strips(inclination, flown, colours, "inclination")
@@ -77,33 +78,34 @@ def _log_degrees(axis: Any, low: float, high: float) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
-def _binned(series: Sequence[Series]) -> tuple[Array, Array]:
-    """Times, and the RMS of each second of each flight, shape (flights, seconds); NaN after a flight's end."""
+def _binned(series: Sequence[Series], bin_s: float) -> tuple[Array, Array]:
+    """Times, and the RMS of each interval of each flight, shape (flights, intervals); NaN after a flight's end."""
     last_s = max((float(s.t_s[-1]) for s in series if len(s.t_s)), default=0.0)
-    edges = np.arange(0.0, last_s + BIN_S, BIN_S)
+    edges = np.arange(0.0, last_s + bin_s, bin_s)
     values = np.full((len(series), max(len(edges) - 1, 1)), np.nan)
     for i, one in enumerate(series):
-        seconds = np.floor(one.t_s / BIN_S).astype(int)
+        intervals = np.floor(one.t_s / bin_s).astype(int)
         for k in range(values.shape[1]):
-            inside = one.judged & (seconds == k)
+            inside = one.judged & (intervals == k)
             if inside.any():
                 values[i, k] = rms(one.value[inside])
-    return edges[:-1] + 0.5 * BIN_S if len(edges) > 1 else np.array([0.5 * BIN_S]), values
+    return edges[:-1] + 0.5 * bin_s if len(edges) > 1 else np.array([0.5 * bin_s]), values
 
 
 def _over_time(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> None:
-    """Median of the seeds, second by second, the middle half of them shaded, a cross where a flight ended early."""
-    top = 1.0
+    """Median of the seeds, the middle half of them shaded, a cross where a flight ended early."""
+    top, many = 1.0, len(entrants) > MANY
+    bin_s = 3.0 * BIN_S if many else BIN_S
     for e in entrants:
-        t, values = _binned([f.inclination for f in e.flights])
+        t, values = _binned([f.inclination for f in e.flights], bin_s)
         seen = np.isfinite(values).any(axis=0)
         t, values = t[seen], np.maximum(values[:, seen], LEAST_DEG)
         if not len(t):
             continue
         low, median, high = np.nanpercentile(values, (25.0, 50.0, 75.0), axis=0)
-        if len(e.flights) > 2:
+        if len(e.flights) > 2 and not many:
             ax.fill_between(t, low, high, color=colours[e.name], alpha=0.13, lw=0)
-        ax.plot(t, median, color=colours[e.name], lw=1.6, label=e.name)
+        ax.plot(t, median, color=colours[e.name], lw=1.3 if many else 1.6)
         for flight in values:
             last = int(np.flatnonzero(np.isfinite(flight))[-1]) if np.isfinite(flight).any() else -1
             if 0 <= last < len(t) - 1 or (last >= 0 and e.survived < len(e.flights) and len(e.flights) == 1):
@@ -111,8 +113,9 @@ def _over_time(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) ->
         top = max(top, float(np.nanmax(high)))
     floor = max(LEAST_DEG, 0.7 * min(float(line.get_ydata().min()) for line in ax.lines))
     ax.set(yscale="log", ylim=(floor, 1.6 * top), xlabel="time since the release, s", ylabel="inclination error, deg")
-    ax.set_title("Inclination error, second by second", pad=15)
-    note = "line: median of the seeds     shade: the middle half     cross: a flight that ended early"
+    ax.set_title("Inclination error over time", pad=15)
+    shade = "" if many else "shade: the middle half     "
+    note = f"line: median of the seeds, RMS of every {bin_s:g} s     {shade}cross: a flight that ended early"
     ax.text(0.0, 1.012, note, transform=ax.transAxes, fontsize=7.8, color=FAINT)
     ax.margins(x=0.01)
     _log_degrees(ax.yaxis, floor, 1.6 * top)
@@ -156,12 +159,13 @@ def _names(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> Non
     ax.spines["bottom"].set_visible(False)
     for i, e in enumerate(entrants):
         ax.plot([0.005, 0.04], [i, i], color=colours[e.name], lw=4, solid_capstyle="butt")
-        ax.text(0.06, i, e.name.rpartition(":")[2], va="center", fontweight="bold", fontsize=9)
-        for j, (name, letter) in enumerate(LETTERS.items()):
-            has = name in e.given
+        name = e.name.rpartition(":")[2]
+        ax.text(0.055, i, name, va="center", fontweight="bold", fontsize=9.0 if len(name) < 22 else 7.6)
+        for j, (instrument, letter) in enumerate(LETTERS.items()):
+            has = instrument in e.given
             box = {"boxstyle": "round,pad=0.18", "facecolor": INK if has else "none", "edgecolor": "none"}
             ax.text(
-                0.74 + 0.06 * j, i, letter, ha="center", va="center", fontsize=7, family="monospace",
+                0.79 + 0.048 * j, i, letter, ha="center", va="center", fontsize=7, family="monospace",
                 color="white" if has else "#c5ccd3", bbox=box if has else None,
             )  # fmt: skip
     ax.set_title("Estimator", pad=15)
