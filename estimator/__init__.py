@@ -54,6 +54,11 @@ ESTIMATORS: dict[str, str] = {
     "dilshad": "estimator.dilshad:Dilshad",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
+    "peer_madgwick": "estimator.peers:Madgwick",
+    "peer_mahony": "estimator.peers:Mahony",
+    "peer_vqf": "estimator.peers:Vqf",
+    "peer_imufusion": "estimator.peers:Imufusion",
+    "peer_imufusion_9d": "estimator.peers:Imufusion9D",
 }
 """Every estimator that can be named: name -> ``module:Class``, imported only when it flies."""
 

@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | replay | bench | aircraft | sensors | export | view``.
+"""The command line: ``wingslevel list | fly | check | compare | replay | bench | aircraft | sensors | export | view``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -18,6 +18,28 @@ from typing import Annotated, Any
 import typer
 
 from scenarios.harness import console
+from scenarios.harness.cli_options import (
+    AircraftOption,
+    AutopilotOption,
+    CalibrationOption,
+    ColumnsOption,
+    EstimatorOption,
+    FaultOption,
+    GpsRateOption,
+    GustOption,
+    ImuRateOption,
+    JsonOption,
+    MarkdownOption,
+    ReferenceOption,
+    SensorsOption,
+    SetOption,
+    ShearOption,
+    ThermalsOption,
+    TurbulenceOption,
+    WebOption,
+    WindOption,
+    WorkersOption,
+)
 from scenarios.harness.console import INTERRUPTED, USAGE
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
@@ -30,64 +52,6 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-EstimatorOption = Annotated[
-    str | None, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
-]
-WindOption = Annotated[
-    str | None,
-    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm."),
-]
-ShearOption = Annotated[
-    str | None,
-    typer.Option("--shear", metavar="EXP", help="Growth of the wind with height: 0 none, 0.14 open country."),
-]
-GustOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; repeat it."
-    ),
-]
-TurbulenceOption = Annotated[
-    str | None,
-    typer.Option("--turbulence", metavar="W20", help="calm, light, moderate, severe, or the wind at 20 ft, m/s."),
-]
-ThermalsOption = Annotated[
-    str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
-]
-AircraftOption = Annotated[str | None, typer.Option("--aircraft", help="Name of an aircraft.")]
-AutopilotOption = Annotated[
-    str | None, typer.Option("--autopilot", help="Registered name, module:Class or file.py:Class.")
-]
-GpsRateOption = Annotated[
-    float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.")
-]
-ImuRateOption = Annotated[
-    int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
-]
-SensorsOption = Annotated[
-    str | None, typer.Option("--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.")
-]
-FaultOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--fault",
-        metavar="FAULT",
-        help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
-        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
-        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
-        "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
-        "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
-    ),
-]
-JsonOption = Annotated[
-    str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
-]
-WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
 
 
 def main() -> None:
@@ -206,9 +170,9 @@ def check(
     sensors: SensorsOption = None,
     fault: FaultOption = None,
     set_: SetOption = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")] = None,
+    workers: WorkersOption = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
-    markdown: Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")] = None,
+    markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
     """The gate for CI: fly scenarios on many seeds, judge each flight and all of them pooled."""
@@ -237,27 +201,71 @@ def check(
 
 
 @app.command()
+def compare(
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
+    estimators: Annotated[
+        str | None, typer.Option("--estimators", metavar="A,B,C", help="What flies it; all there are by default.")
+    ] = None,
+    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds that each of them flies: 0-9 or 0,2,5-7.")] = "0-9",
+    wind: WindOption = None,
+    shear: ShearOption = None,
+    gust: GustOption = None,
+    turbulence: TurbulenceOption = None,
+    thermals: ThermalsOption = None,
+    aircraft: AircraftOption = None,
+    autopilot: AutopilotOption = None,
+    gps_rate: GpsRateOption = None,
+    imu_rate: ImuRateOption = None,
+    sensors: SensorsOption = None,
+    fault: FaultOption = None,
+    set_: SetOption = None,
+    workers: WorkersOption = None,
+    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it, as PNG, SVG or PDF.")] = None,
+    markdown: MarkdownOption = None,
+    json_: JsonOption = None,
+) -> int:
+    """Estimators side by side: each flies the scenario on the same seeds, through the same air and noise."""
+    from scenarios.harness import compare as comparing
+    from scenarios.harness import gate, handbook
+
+    with _reporting(json_) as report:
+        with usage():
+            for path in (picture, markdown):
+                _check_file(path)
+            handbook.check_picture(picture)
+            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
+            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
+            names = [name.strip() for name in (estimators or "").split(",") if name.strip()]
+            flown = comparing.prepare(scenario, names, gate.parse_seeds(seeds), changes)
+            console.warn_if_cold()
+            with console.progress("flying", "flights") as advance:
+                compared = comparing.fly(flown, workers or _processors(), advance)
+        if picture is not None:
+            from scenarios.harness import compare_picture
+
+            with usage():
+                compare_picture.draw(compared, picture)
+        _write(markdown, compared.to_markdown)
+        report(compared.to_json())
+        comparing.tell(compared)  # last: a reader who closes the pipe loses no report
+    return compared.exit_code
+
+
+@app.command()
 def replay(
     log: Annotated[Path, typer.Argument(help="Recording of ours, .csv, .mat, .bin, .ulg, or reference vectors.")],
     estimator: Annotated[
         str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
     ] = "premerlani",
-    reference: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
-    ] = None,
-    columns: Annotated[
-        str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")
-    ] = None,
+    reference: ReferenceOption = None,
+    columns: ColumnsOption = None,
     imu: Annotated[
         int | None, typer.Option(min=0, metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0.")
     ] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
     ] = None,
-    calibration: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]"),
-    ] = None,
+    calibration: CalibrationOption = None,
     airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
     settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,
     out: Annotated[Path, typer.Option(help="Folder for the recordings.")] = FLIGHTS,

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from rich.text import Text
 
@@ -24,10 +24,20 @@ from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Outcome
 
 LARGEST_SEED = 2**32 - 1
+_Result = TypeVar("_Result")
+_Told = TypeVar("_Told", covariant=True)
 
 
 class WorkerDied(RuntimeError):
     """A worker process was killed from outside, so that flights are missing."""
+
+
+class Flyable(Protocol[_Told]):
+    """A flight that can be sent to a process."""
+
+    def fly(self) -> _Told:
+        """Fly it, and say what is to be known of it."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,12 +121,23 @@ def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], N
     ------
     ValueError      as `fly_scenario` does
     """
-    done: dict[int, FlightVerdict] = {}
+    done = fly_each(tasks, workers, advance, lambda verdict: verdict.outcome == Outcome.INTERRUPTED)
+    return Verdict.of((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(done) == len(tasks)
 
-    def keep(i: int, verdict: FlightVerdict) -> None:
-        if verdict.outcome == Outcome.INTERRUPTED:
+
+def fly_each(
+    tasks: Sequence[Flyable[_Result]],
+    workers: int,
+    advance: Callable[[int, int], None],
+    interrupted: Callable[[_Result], bool],
+) -> dict[int, _Result]:
+    """Fly all `tasks`: the results that were finished, by the number of the task; those missing as in `fly_all`."""
+    done: dict[int, _Result] = {}
+
+    def keep(i: int, result: _Result) -> None:
+        if interrupted(result):
             raise KeyboardInterrupt
-        done[i] = verdict
+        done[i] = result
         advance(len(done), len(tasks))
 
     try:
@@ -129,15 +150,15 @@ def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], N
         pass  # what has been finished is judged; the caller sees that flights are missing
     except WorkerDied as problem:
         console.error(str(problem))
-    return Verdict.of((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(done) == len(tasks)
+    return done
 
 
-def _fly_over_processes(tasks: Sequence[Task], workers: int, keep: Callable[[int, FlightVerdict], None]) -> None:
+def _fly_over_processes(tasks: Sequence[Flyable[_Result]], workers: int, keep: Callable[[int, _Result], None]) -> None:
     # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
     context = multiprocessing.get_context("spawn")
     workers = min(workers, len(tasks))
     with ProcessPoolExecutor(workers, mp_context=context, initializer=_set_up_worker) as pool:
-        waiting: dict[Future[FlightVerdict], int] = {pool.submit(task.fly): i for i, task in enumerate(tasks)}
+        waiting: dict[Future[_Result], int] = {pool.submit(task.fly): i for i, task in enumerate(tasks)}
         try:
             while waiting:
                 for future in wait(waiting, return_when=FIRST_COMPLETED).done:

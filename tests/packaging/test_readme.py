@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from estimator import ESTIMATORS
+from scenarios.harness import plugins
 from scenarios.harness.cli import run
+from scenarios.harness.compare import LETTERS
 from scenarios.harness.registry import find
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -109,6 +112,15 @@ def test_readme_options_of_the_gate_exist(here: Path) -> None:
     arguments = ["0" if word == "0-9" else word for word in shlex.split(command)[1:]]
     assert run([*arguments, "hand_launch", "--workers", "1"]) in (0, 1)
     assert {"verdict.xml", "verdict.md", "verdict.json"} <= {path.name for path in here.iterdir()}
+
+
+def test_estimators_page_has_a_row_for_each_with_what_it_uses() -> None:
+    """One row for every registered estimator; its letters are those of the class."""
+    page = (ROOT / "docs" / "estimators.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \| ([GAPMV]+) \| ", page, re.M))
+    for name in ESTIMATORS:
+        uses = plugins.load_estimator(name).uses  # type: ignore[attr-defined]
+        assert rows[name] == "".join(letter for what, letter in LETTERS.items() if what in uses), name
 
 
 def test_documents_link_to_files_that_exist() -> None:

@@ -1,0 +1,74 @@
+"""The options of the command line that several commands take."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EstimatorOption = Annotated[
+    str | None, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
+]
+WindOption = Annotated[
+    str | None,
+    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm."),
+]
+ShearOption = Annotated[
+    str | None,
+    typer.Option("--shear", metavar="EXP", help="Growth of the wind with height: 0 none, 0.14 open country."),
+]
+GustOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; repeat it."
+    ),
+]
+TurbulenceOption = Annotated[
+    str | None,
+    typer.Option("--turbulence", metavar="W20", help="calm, light, moderate, severe, or the wind at 20 ft, m/s."),
+]
+ThermalsOption = Annotated[
+    str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
+]
+AircraftOption = Annotated[str | None, typer.Option("--aircraft", help="Name of an aircraft.")]
+AutopilotOption = Annotated[
+    str | None, typer.Option("--autopilot", help="Registered name, module:Class or file.py:Class.")
+]
+GpsRateOption = Annotated[
+    float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.")
+]
+ImuRateOption = Annotated[
+    int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
+]
+SensorsOption = Annotated[
+    str | None, typer.Option("--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.")
+]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        metavar="FAULT",
+        help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
+        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
+        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
+        "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
+        "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
+    ),
+]
+JsonOption = Annotated[
+    str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
+]
+WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
+WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")]
+MarkdownOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")]
+CalibrationOption = Annotated[
+    float | None,
+    typer.Option(metavar="S", help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]"),
+]
+ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")]
+ReferenceOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
+]
