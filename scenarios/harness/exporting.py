@@ -81,9 +81,10 @@ def accuracy_of(flight: Flight) -> Accuracy:
     config = flight.manifest.get("config")
     if config is None:
         return Accuracy()
-    gps = suite_params(config["suite"], config["sensors"]).gps
-    both_axes_m = math.sqrt(2.0) * gps.wander_horizontal_m
-    return Accuracy(both_axes_m, gps.wander_vertical_m, gps.velocity_noise_m_s)
+    gps = suite_params(config["suite"], config["sensors"], config.get("files", {})).gps
+    both_axes_m = math.sqrt(2.0) * math.hypot(gps.wander_horizontal_m, gps.noise_horizontal_m)
+    vertical_m = math.hypot(gps.wander_vertical_m, gps.noise_vertical_m)
+    return Accuracy(both_axes_m, vertical_m, math.hypot(gps.velocity_noise_m_s, gps.velocity_wander_m_s))
 
 
 def tell(export: Export) -> None:
