@@ -14,7 +14,8 @@ _UNITS = (
     ("_deg_s_sqrt_s", "deg/s/sqrt(s)"), ("_ug_sqrt_s", "ug/sqrt(s)"), ("_deg_s_min", "deg/s/min"),
     ("_per_k_deg_s", "deg/s/K"), ("_per_k_mg", "mg/K"), ("_per_k", "1/K"), ("mv_deg_s", "mV/(deg/s)"),
     ("mv_g", "mV/g"), ("_deg_s_g", "deg/s/g"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_m_s2", "m/s2"),
-    ("_m_s", "m/s"), ("_deg", "deg"), ("_hz", "Hz"), ("_hpa", "hPa"), ("_pa", "Pa"), ("_ut", "uT"), ("_ug", "ug"),
+    ("_m_s", "m/s"), ("_deg", "deg"), ("_hz", "Hz"), ("_hpa", "hPa"), ("_pa_min", "Pa/min"),
+    ("_pa", "Pa"), ("_ut", "uT"), ("_ug", "ug"),
     ("_mg", "mg"), ("_rpm", "rpm"), ("_m", "m"), ("_g", "g"), ("_s", "s"), ("_k", "K"), ("_v", "V"),
     ("bits", "bit"),
 )  # fmt: skip

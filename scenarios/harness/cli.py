@@ -304,6 +304,7 @@ def sensors(
             _check_file(picture)
             sensor_page.check_picture(picture)
             subject = sensor_names.subject(part)
+            sensor_page.check_rates(subject, part)
         console.warn_if_cold()
         with console.progress("lying still", "axis-hours") as advance:
             page = sensor_page.make(subject, advance)

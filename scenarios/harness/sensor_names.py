@@ -35,9 +35,9 @@ def subject(name: str) -> Subject:
         return _suite(suites[_plain(name)])
     if name.endswith(".toml"):
         return _suite(name) if _is_suite(name) else _part(load_part(name))
-    known = {_plain(part): part for part in [*part_names(), *suites, "perfect"]}
-    if _plain(name) not in known:
-        hint = near_misses(_plain(name), known)
+    known = [*part_names(), *SUITES, "perfect"]
+    if _plain(name) not in map(_plain, known):
+        hint = near_misses(name, known)
         raise ValueError(f"unknown part or suite {name!r}: {hint} (one's own: path/to/part.toml)")
     return _part(load_part(name))
 

@@ -68,7 +68,9 @@ class Page:
             data["datasheet"] = about.datasheet
         for kind, params in about.devices.items():
             figures = {f.name: _plain(getattr(params, f.name)) for f in fields(params)}
-            data[kind] = self._measured(kind) | {"figures": figures}
+            cited = {f.name: about.sources.get(f"{kind}.{f.name}") for f in fields(params)}
+            sources = {name: source for name, source in cited.items() if source}
+            data[kind] = self._measured(kind) | {"figures": figures, "sources": sources}
         return data
 
     def _measured(self, kind: str) -> dict[str, Any]:
@@ -131,6 +133,14 @@ def make(
         sensor_trial.turn_around(devices["magnetometer"]) if "magnetometer" in devices else None,
         sensor_trial.swing(air) if air else None,
     )
+
+
+def check_rates(subject: Subject, name: str) -> None:
+    """Refuse, before anything is computed, a sensor whose rate the trials cannot run at: ValueError with its `name`."""
+    try:
+        sensor_trial.check_rates(subject.devices)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def _inertial_effects(kind: str, params: Any, rest: AtRest) -> list[Row]:

@@ -268,6 +268,16 @@ def fitted(devices: Mapping[str, Any]) -> SuiteParams:
     return SuiteParams(**(always | dict(devices)))
 
 
+def check_rates(devices: Mapping[str, Any]) -> None:
+    """Refuse a sensor that reports at a rate which the trials' clock has not: ValueError."""
+    rates = Rates(imu_hz=IMU_HZ)
+    for kind, params in devices.items():
+        if kind == "gps":
+            Rates(imu_hz=IMU_HZ, gps_hz=params.rate_hz)
+        elif kind not in INERTIAL:
+            rates.steps_per_sample(kind, params.rate_hz)
+
+
 def fly(params: SuiteParams, motion: Any, seconds: float, rates: Rates, quiet: bool = False) -> Log:
     """What the suite makes of `motion`; where `quiet`, without anything that is drawn tick by tick."""
     log = Log.empty(rates.ticks(seconds))

@@ -11,6 +11,7 @@ import pytest
 from scenarios.harness import sensor_names, sensor_page, sensor_trial
 from scenarios.harness.cli import run
 from sim.clock import Rates
+from sim.params import unit_of, words_of
 from sim.sensors.datasheet import GENERIC, PERFECT, part_names
 from sim.sensors.fitting import SUITES
 from sim.sensors.gps import GpsParams
@@ -106,6 +107,7 @@ def test_picture_is_drawn(short, tmp_path, name, ending):
     ("arguments", "words"),
     [
         (["itg3201"], "did you mean itg3200"),
+        (["Devboard-Gren"], "did you mean devboard_green"),
         (["nonsense.toml"], "no such file"),
         (["itg3200", "--picture", "page.gif"], ".png, .svg, .pdf"),
         (["--picture", "page.png"], "name the part"),
@@ -117,6 +119,35 @@ def test_refusal_is_one_line_and_code_2(capsys, arguments, words):
     assert words in streams.err
     assert len(streams.err.splitlines()) == 1
     assert streams.out == ""
+
+
+@pytest.mark.parametrize(("kind", "rate_hz"), [("magnetometer", 75.0), ("gps", 7.0), ("barometer", 60.0)])
+def test_page_of_a_rate_that_cannot_be_tried_is_refused_in_one_line(tmp_path, capsys, kind, rate_hz):
+    """Before anything is computed, with the file and what would be right."""
+    part = tmp_path / "mine.toml"
+    part.write_text(
+        f'name = "Mine"\nmaker = "me"\nsummary = "mine"\ndatasheet = "none"\n[{kind}]\n'
+        f'rate_hz = {{ value = {rate_hz}, source = "typical" }}\n'
+    )
+    assert run(["sensors", str(part)]) == 2
+    streams = capsys.readouterr()
+    assert streams.out == ""
+    assert len(streams.err.splitlines()) == 1
+    assert f"mine.toml: {'GPS' if kind == 'gps' else kind} rate {rate_hz:g} Hz" in streams.err
+    assert "choose" in streams.err
+
+
+def test_json_says_where_each_figure_comes_from(short, tmp_path):
+    """So that a `datasheet` figure that is only typical can be told from one that the data sheet has."""
+    sources = page_json(tmp_path, "ms5611")["barometer"]["sources"]
+    assert sources["drift_pa_min"] == "typical"
+    assert "0.012 mbar" in sources["noise_pa"]
+
+
+def test_every_figure_with_a_unit_in_its_name_shows_it():
+    """Weather's drift is in Pa/min."""
+    assert (unit_of("drift_pa_min"), words_of("drift_pa_min")) == ("Pa/min", "drift")
+    assert (unit_of("noise_pa"), words_of("noise_pa")) == ("Pa", "noise")
 
 
 def test_exercise_is_the_motion_it_says():
