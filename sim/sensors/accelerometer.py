@@ -16,7 +16,7 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams, warming
-from sim.sensors.device import distort, on_supply, quantise, rate_shape, shake, step_filter
+from sim.sensors.device import distort, filter_noise, on_supply, quantise, rate_shape, shake, step_filter
 from sim.sensors.noise import (
     FLICKER_TIMES_S,
     STANDARD_GRAVITY_M_S2,
@@ -137,14 +137,18 @@ def measure_force(truth, measured, noise, k, unit, board, memory, state):  # typ
     if unit.filters or unit.shakes or unit.off_centre:
         feel_force(truth, k, unit, board, memory, state)
         force = memory.signal
+    found = errors.force_noise_b_m_s2
+    if unit.noise_filters:
+        filter_noise(found, noise[max(k - 1, 0)].force_noise_b_m_s2, k, unit, memory.noise)
+        found = memory.noise
     for i in range(3):
         bias = errors.force_bias_b_m_s2[i]
         turned = unit.M[i, 0] * force[0] + unit.M[i, 1] * force[1] + unit.M[i, 2] * force[2]
         if unit.distorts:
-            sensed = distort(turned, i, unit, state) + bias + errors.force_noise_b_m_s2[i]
+            sensed = distort(turned, i, unit, state) + bias + found[i]
             sensed, bias = on_supply(sensed, unit, state), on_supply(bias, unit, state)
         else:
-            sensed = turned + bias + errors.force_noise_b_m_s2[i]
+            sensed = turned + bias + found[i]
         measured[k].force_b_m_s2[i] = quantise(sensed, unit)
         row.force_bias_b_m_s2[i] = bias
 

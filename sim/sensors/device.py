@@ -27,7 +27,7 @@ from estimator.jit import kernel
 from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.sensors.board import BoardParams
-from sim.sensors.noise import Source
+from sim.sensors.noise import Source, sample_sigma
 
 # In SI units of the reading.  A flag for each group, so that what is off costs nothing.
 DEVICE: tuple[Any, ...] = (
@@ -39,6 +39,9 @@ DEVICE: tuple[Any, ...] = (
     ("shake_rad", "f8", (3,)),  # phase of each axis against the rotor
     ("bandwidth_hz", "f8"),
     ("conversions", "i8"),
+    ("noise_filters", "i8"),
+    ("noise_filter", "f8", (3,)),  # phi, b0, b1
+    ("noise_gain", "f8"),  # sigma of a sample's noise, against that of the mean over the tick of unfiltered noise
     ("distorts", "i8"),  # any of the terms from here to the converter
     ("gain_per_k", "f8", (3,)),
     ("bend", "f8", (3,)),  # largest deviation from the straight line
@@ -52,6 +55,7 @@ DEVICE: tuple[Any, ...] = (
 MEMORY: tuple[Any, ...] = (
     ("filtered", "f8", (3,)),  # output of the low-pass filter at the end of the tick
     ("signal", "f8", (3,)),  # mean over the tick of what reaches the part's output
+    ("noise", "f8", (3,)),  # what the converter finds of the noise
 )
 
 
@@ -79,9 +83,35 @@ def low_pass(bandwidth_hz: float, dt_s: float) -> Array:
 def noise_of_one_conversion(density_sqrt_hz: float, bandwidth_hz: float, conversions: int, imu_hz: float) -> float:
     """Sigma of one conversion under a one-sided noise density: over the filter's noise bandwidth, pi/2 times its own.
 
-    Without a filter, the density of a sample holds: the mean of n conversions has 1 / n of the power of one.
+    Without a filter the density of a sample holds: the mean of n conversions has 1 / n of the power of one.
     """
-    return density_sqrt_hz * math.sqrt(min(math.pi / 2.0 * bandwidth_hz, conversions * imu_hz / 2.0))
+    noise_hz = conversions * imu_hz / 2.0 if math.isinf(bandwidth_hz) else math.pi / 2.0 * bandwidth_hz
+    return density_sqrt_hz * math.sqrt(noise_hz)
+
+
+def noise_filter(bandwidth_hz: float, conversions: int, imu_hz: float) -> tuple[Array, float]:
+    """What a low-pass filter and a few conversions in each tick make of white noise: phi, b0, b1; and its sigma.
+
+    A part samples the noise behind its filter, autocorrelation exp(-2 pi bandwidth |lag|), at the middles of equal
+    parts of the tick.  The mean of those has autocovariances r0, r1, phi r1, phi^2 r1, ... a tick apart: it is the
+    process x(k) = phi x(k-1) + b0 w(k) + b1 w(k-1) of unit white noise w (Box and Jenkins, Time Series Analysis,
+    1970, ARMA(1, 1)), with b0^2 + b1^2 = (1 + phi^2) r0 - 2 phi r1 and b0 b1 = r1 - phi r0.  All is relative to
+    `sample_sigma`.  Where a fast signal is sampled once, noise from above the sample rate folds down and sigma
+    exceeds 1; a continuous mean (0 conversions) or no filter leaves the noise as it is.
+    """
+    n = conversions
+    if n == 0 or math.isinf(bandwidth_hz):
+        return np.array([0.0, 1.0, 0.0]), 1.0
+    variance = (noise_of_one_conversion(1.0, bandwidth_hz, n, imu_hz) / sample_sigma(1.0, imu_hz)) ** 2
+    a = 2.0 * math.pi * bandwidth_hz / imu_hz
+    apart = np.arange(1, 2 * n)  # of two conversions, in n-ths of a tick
+    alike = np.exp(-a / n * apart)
+    r0 = variance * (n + 2.0 * np.sum((n - apart[: n - 1]) * alike[: n - 1])) / n**2
+    r1 = variance * np.sum((n - np.abs(apart - n)) * alike) / n**2
+    phi = math.exp(-a)
+    total = math.sqrt((1.0 - phi) * ((1.0 - phi) * r0 + 2.0 * r1))  # b0 + b1
+    difference = math.sqrt((1.0 + phi) * ((1.0 + phi) * r0 - 2.0 * r1))  # b0 - b1
+    return np.array([phi, 0.5 * (total + difference), 0.5 * (total - difference)]), math.sqrt(r0)
 
 
 def converter(step: float, full_scale: float, bits: int, conversions: int, sigma: float) -> tuple[float, float, float]:
@@ -118,6 +148,8 @@ def make(
     unit["shakes"], unit["shake"], unit["conversions"] = shake > 0.0, shake, params.conversions
     if shake:
         unit["shake_rad"] = source(f"{name} vibration").uniform(0.0, 2.0 * math.pi, 3)
+    unit["noise_filter"], unit["noise_gain"] = noise_filter(params.bandwidth_hz, params.conversions, rates.imu_hz)
+    unit["noise_filters"] = params.conversions > 0 and math.isfinite(params.bandwidth_hz)
     unit["gain_per_k"] = drawn("gain temperature", params.gain_per_k)
     if math.isfinite(full_scale):  # a fraction of no full scale is nothing
         unit["bend"] = drawn("non-linearity", params.nonlinearity * full_scale)
@@ -132,6 +164,17 @@ def make(
 def step_filter(weights, before, mean, rise, bulge):  # type: ignore[no-untyped-def]
     """Output of the low-pass filter at the end of a tick, from that `before` it and the shape of the signal in it."""
     return weights[0] * before + weights[1] * mean + weights[2] * 0.5 * rise + weights[3] * bulge
+
+
+@kernel
+def filter_noise(fresh, before, k, unit, found):  # type: ignore[no-untyped-def]
+    """Noise of tick k as the converter finds it, into `found`, from that drawn for this tick and the one `before`.
+
+    See `noise_filter`; at power-up the filter has its own sigma already.
+    """
+    phi, b0, b1 = unit.noise_filter[0], unit.noise_filter[1], unit.noise_filter[2]
+    for i in range(3):
+        found[i] = phi * found[i] + b0 * fresh[i] + b1 * before[i] if k > 0 else unit.noise_gain * fresh[i]
 
 
 @kernel

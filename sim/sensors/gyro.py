@@ -18,7 +18,7 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams, warming
-from sim.sensors.device import distort, on_supply, quantise, rate_shape, shake, step_filter
+from sim.sensors.device import distort, filter_noise, on_supply, quantise, rate_shape, shake, step_filter
 from sim.sensors.noise import (
     FLICKER_TIMES_S,
     STANDARD_GRAVITY_M_S2,
@@ -147,6 +147,10 @@ def measure_rate(truth, measured, noise, k, unit, board, memory, state):  # type
     if unit.filters or unit.shakes:
         feel_rate(truth, k, unit, board, memory, state)
         omega = memory.signal
+    found = errors.gyro_noise_b_rad_s
+    if unit.noise_filters:
+        filter_noise(found, noise[max(k - 1, 0)].gyro_noise_b_rad_s, k, unit, memory.noise)
+        found = memory.noise
     for i in range(3):
         bias = errors.gyro_bias_b_rad_s[i]
         turned = unit.M[i, 0] * omega[0] + unit.M[i, 1] * omega[1] + unit.M[i, 2] * omega[2]
@@ -154,10 +158,10 @@ def measure_rate(truth, measured, noise, k, unit, board, memory, state):  # type
             f, G = row.imu_force_b_m_s2, unit.g_sensitivity
             turned += G[i, 0] * f[0] + G[i, 1] * f[1] + G[i, 2] * f[2]
         if unit.distorts:
-            sensed = distort(turned, i, unit, state) + bias + errors.gyro_noise_b_rad_s[i]
+            sensed = distort(turned, i, unit, state) + bias + found[i]
             sensed, bias = on_supply(sensed, unit, state), on_supply(bias, unit, state)
         else:
-            sensed = turned + bias + errors.gyro_noise_b_rad_s[i]
+            sensed = turned + bias + found[i]
         measured[k].gyro_b_rad_s[i] = quantise(sensed, unit)
         row.gyro_bias_b_rad_s[i] = bias
 

@@ -208,6 +208,13 @@ def test_sigma_of_a_sample_is_what_the_density_makes_at_50_hz():
     assert rest.sample_sigma == pytest.approx(expected, rel=0.02)
 
 
+def test_sigma_of_a_sample_has_what_folds_down_into_it():
+    """ITG-3200, read once a tick: its density over the noise bandwidth of its filter, pi/2 42 Hz."""
+    params = sensor_names.subject("itg3200").devices["gyro"]
+    rest = sensor_trial.at_rest("gyro", params, flights=2, seconds=600.0)
+    assert rest.sample_sigma == pytest.approx(0.03 * math.sqrt(math.pi / 2.0 * 42.0), rel=0.02)
+
+
 def test_manual_lists_every_part_and_suite_and_its_examples_can_be_flown(tmp_path):
     """docs/sensors.md: the tables are complete, and the part and the suite of one's own are accepted as written."""
     manual = (Path(__file__).parents[2] / "docs" / "sensors.md").read_text(encoding="utf-8")
