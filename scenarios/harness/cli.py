@@ -325,7 +325,7 @@ def export(
     nmea: Annotated[Path | None, typer.Option(metavar="FILE", help="Write NMEA 0183: GGA, RMC and VTG.")] = None,
     ubx: Annotated[Path | None, typer.Option(metavar="FILE", help="Write UBX NAV-PVT.")] = None,
     start: Annotated[
-        str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2025-06-01T12:00:00]")
+        str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2026-07-02T12:00:00]")
     ] = None,
     json_: JsonOption = None,
 ) -> None:

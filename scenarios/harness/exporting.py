@@ -48,7 +48,7 @@ def parse_start(text: str | None) -> datetime:
         start = datetime.fromisoformat(text)
     except ValueError as error:
         raise ValueError(
-            f"--start {text!r}: write a date and a time of UTC, for instance 2025-06-01T12:00:00"
+            f"--start {text!r}: write a date and a time of UTC, for instance 2026-07-02T12:00:00"
         ) from error
     return start if start.tzinfo is not None else start.replace(tzinfo=gps_messages.START.tzinfo)
 
