@@ -1,4 +1,4 @@
-"""White noise behind a part's low-pass filter, sampled by its converter: against a simulation of it and closed forms."""
+"""White noise behind a part's low-pass filter, as its converter samples it: against a simulation and closed forms."""
 
 import hashlib
 import math
