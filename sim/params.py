@@ -26,10 +26,25 @@ def unit_of(name: str) -> str:
     return next((unit for end, unit in _UNITS if name.endswith(end)), "")
 
 
+# Fields whose names differ from another's of the same part by the unit alone.
+_WORDS = {
+    "wander_s": "wander time", "velocity_wander_s": "velocity wander time", "warming_s": "warming time",
+    "motor_rpm": "motor speed", "vibration_deg_s": "vibration turning", "vibration_rpm": "vibration at speed",
+}  # fmt: skip
+
+
 def words_of(name: str) -> str:
-    """What a field's name says besides its unit, as words: ``noise_density_ug_sqrt_hz`` is noise density."""
+    """What a field's name says besides its unit, as words: ``noise_density_ug_sqrt_hz`` is noise density.
+
+    Of the fields of a part no two have the same words.
+    """
+    if name in _WORDS:
+        return _WORDS[name]
     end = next((end.removeprefix("noise_density") for end, _ in _UNITS if name.endswith(end)), "")
-    return (name if end == "bits" else name.removesuffix(end)).replace("_", " ")
+    words = (name if end == "bits" else name.removesuffix(end)).strip("_").removesuffix("_b").replace("_", " ")
+    if end.startswith("_per_k"):
+        return f"{words} per kelvin"
+    return f"{words}, body axes" if f"_b{end}" in name else words
 
 
 def near_misses(name: str, names: Iterable[str]) -> str:

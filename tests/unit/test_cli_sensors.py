@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from scenarios.harness import sensor_names, sensor_page, sensor_trial
 from scenarios.harness.cli import run
 from sim.clock import Rates
 from sim.params import unit_of, words_of
+from sim.sensors.board import BoardParams
 from sim.sensors.datasheet import GENERIC, PERFECT, part_names
 from sim.sensors.fitting import SUITES
 from sim.sensors.gps import GpsParams
@@ -148,6 +150,34 @@ def test_every_figure_with_a_unit_in_its_name_shows_it():
     """Weather's drift is in Pa/min."""
     assert (unit_of("drift_pa_min"), words_of("drift_pa_min")) == ("Pa/min", "drift")
     assert (unit_of("noise_pa"), words_of("noise_pa")) == ("Pa", "noise")
+
+
+def test_no_two_figures_of_a_part_or_board_are_called_alike():
+    """Rows of one table with different units have different words."""
+    for params in [*GENERIC.values(), BoardParams()]:
+        words = [words_of(f.name) for f in fields(params)]
+        assert len(set(words)) == len(words), words
+    assert (words_of("bias_per_k_deg_s"), words_of("gain_per_k")) == ("bias per kelvin", "gain per kelvin")
+    assert (words_of("hard_iron_b_ut"), words_of("sensitivity_mv_g")) == ("hard iron, body axes", "sensitivity")
+
+
+def test_page_of_a_suite_has_its_board_its_changes_and_what_a_wrong_supply_reads(short, tmp_path, capsys):
+    """Green board: an absolute null through a ratiometric converter, V0 / (1 + e) - V0 of the null in deg/s."""
+    gyro = sensor_names.subject("adxrs401").devices["gyro"]
+    data = page_json(tmp_path, "devboard_green")
+    assert data["settings"]["board.supply_tolerance"] == 0.005
+    assert data["settings"]["board.converter.reference_v"] == 5.0
+    effects = data["gyro"]["effects"]
+    shift = gyro.null_deg_s * (1.0 / 1.005 - 1.0)
+    assert effects["at rest, supply 0.5 % high, its sigma (deg/s)"] == pytest.approx(shift, rel=1e-12)
+    assert effects["at rest, supply 0.2 % low, full throttle (deg/s)"] == pytest.approx(
+        gyro.null_deg_s * (1.0 / 0.998 - 1.0), rel=1e-12
+    )
+    assert not any("supply" in what for what in data["accelerometer"]["effects"])  # ratiometric as the converter
+    assert run(["sensors", "devboard_green"]) == 0
+    text = capsys.readouterr().out
+    for words in ("board: supply tolerance", "board converter: reference", "accelerometer: bias", "supply 0.5 % high"):
+        assert words in text
 
 
 def test_exercise_is_the_motion_it_says():
