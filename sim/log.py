@@ -45,8 +45,8 @@ TRUTH = (
     Column("rotor_rpm", (), "propeller speed, revolutions per minute"),
     Column("thrust_n", (), "propeller thrust"),
     Column("phase", (), "0 held, 1 thrown, 2 flying", integer=True),
-    Column("gyro_bias_b_rad_s", (3,), "what the gyro reads too much, at this tick"),
-    Column("force_bias_b_m_s2", (3,), "what the accelerometer reads too much"),
+    Column("gyro_bias_b_rad_s", (3,), "what the gyro reads without rotation and without noise, at this tick"),
+    Column("force_bias_b_m_s2", (3,), "what the accelerometer reads without force and without noise"),
     Column("gps_p_e_m", (3,), "position inside the receiver, after its filter, before its latency"),
     Column("gps_v_e_m_s", (3,), "velocity inside the receiver, after its filter, before its latency"),
 )

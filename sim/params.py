@@ -14,7 +14,8 @@ _UNITS = (
     ("_deg_s_sqrt_s", "deg/s/sqrt(s)"), ("_ug_sqrt_s", "ug/sqrt(s)"), ("_deg_s_min", "deg/s/min"),
     ("_per_k_deg_s", "deg/s/K"), ("_per_k_mg", "mg/K"), ("_per_k", "1/K"), ("mv_deg_s", "mV/(deg/s)"),
     ("mv_g", "mV/g"), ("_deg_s_g", "deg/s/g"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_m_s2", "m/s2"),
-    ("_m_s", "m/s"), ("_deg", "deg"), ("_hz", "Hz"), ("_hpa", "hPa"), ("_pa", "Pa"), ("_ut", "uT"), ("_ug", "ug"),
+    ("_m_s", "m/s"), ("_deg", "deg"), ("_hz", "Hz"), ("_hpa", "hPa"), ("_pa_min", "Pa/min"),
+    ("_pa", "Pa"), ("_ut", "uT"), ("_ug", "ug"),
     ("_mg", "mg"), ("_rpm", "rpm"), ("_m", "m"), ("_g", "g"), ("_s", "s"), ("_k", "K"), ("_v", "V"),
     ("bits", "bit"),
 )  # fmt: skip
@@ -25,10 +26,25 @@ def unit_of(name: str) -> str:
     return next((unit for end, unit in _UNITS if name.endswith(end)), "")
 
 
+# Fields whose names differ from another's of the same part by the unit alone.
+_WORDS = {
+    "wander_s": "wander time", "velocity_wander_s": "velocity wander time", "warming_s": "warming time",
+    "motor_rpm": "motor speed", "vibration_deg_s": "vibration turning", "vibration_rpm": "vibration at speed",
+}  # fmt: skip
+
+
 def words_of(name: str) -> str:
-    """What a field's name says besides its unit, as words: ``noise_density_ug_sqrt_hz`` is noise density."""
+    """What a field's name says besides its unit, as words: ``noise_density_ug_sqrt_hz`` is noise density.
+
+    Of the fields of a part no two have the same words.
+    """
+    if name in _WORDS:
+        return _WORDS[name]
     end = next((end.removeprefix("noise_density") for end, _ in _UNITS if name.endswith(end)), "")
-    return (name if end == "bits" else name.removesuffix(end)).replace("_", " ")
+    words = (name if end == "bits" else name.removesuffix(end)).strip("_").removesuffix("_b").replace("_", " ")
+    if end.startswith("_per_k"):
+        return f"{words} per kelvin"
+    return f"{words}, body axes" if f"_b{end}" in name else words
 
 
 def near_misses(name: str, names: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ from typing import Final
 LATITUDE_DEG: Final = 42.80
 LONGITUDE_DEG: Final = -73.95
 ELEVATION_M: Final = 0.0  # above the sea; JSBSim's ground lies there
-YEAR: Final = 2026.5  # of the flight, for the magnetic field, which changes
+YEAR: Final = 2026.5  # of the flight: for the magnetic field, which changes, and for the receiver's clock
 
 _MAJOR_AXIS_M: Final = 6378137.0  # WGS 84
 _ECCENTRICITY2: Final = 6.69437999014e-3

@@ -362,6 +362,7 @@ def sensors(
             _check_file(picture)
             sensor_page.check_picture(picture)
             subject = sensor_names.subject(part)
+            sensor_page.check_rates(subject, part)
         console.warn_if_cold()
         with console.progress("lying still", "axis-hours") as advance:
             page = sensor_page.make(subject, advance)
@@ -382,7 +383,7 @@ def export(
     nmea: Annotated[Path | None, typer.Option(metavar="FILE", help="Write NMEA 0183: GGA, RMC and VTG.")] = None,
     ubx: Annotated[Path | None, typer.Option(metavar="FILE", help="Write UBX NAV-PVT.")] = None,
     start: Annotated[
-        str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2025-06-01T12:00:00]")
+        str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2026-07-02T12:00:00]")
     ] = None,
     json_: JsonOption = None,
 ) -> None:

@@ -48,7 +48,7 @@ def parse_start(text: str | None) -> datetime:
         start = datetime.fromisoformat(text)
     except ValueError as error:
         raise ValueError(
-            f"--start {text!r}: write a date and a time of UTC, for instance 2025-06-01T12:00:00"
+            f"--start {text!r}: write a date and a time of UTC, for instance 2026-07-02T12:00:00"
         ) from error
     return start if start.tzinfo is not None else start.replace(tzinfo=gps_messages.START.tzinfo)
 
@@ -81,9 +81,10 @@ def accuracy_of(flight: Flight) -> Accuracy:
     config = flight.manifest.get("config")
     if config is None:
         return Accuracy()
-    gps = suite_params(config["suite"], config["sensors"]).gps
-    both_axes_m = math.sqrt(2.0) * gps.wander_horizontal_m
-    return Accuracy(both_axes_m, gps.wander_vertical_m, gps.velocity_noise_m_s)
+    gps = suite_params(config["suite"], config["sensors"], config.get("files", {})).gps
+    both_axes_m = math.sqrt(2.0) * math.hypot(gps.wander_horizontal_m, gps.noise_horizontal_m)
+    vertical_m = math.hypot(gps.wander_vertical_m, gps.noise_vertical_m)
+    return Accuracy(both_axes_m, vertical_m, math.hypot(gps.velocity_noise_m_s, gps.velocity_wander_m_s))
 
 
 def tell(export: Export) -> None:

@@ -11,7 +11,7 @@ from scenarios.harness import console
 from scenarios.harness.sensor_page import Subject
 from sim.params import near_misses
 from sim.sensors.datasheet import KINDS, Part, load_part, part_names, read_text, read_toml
-from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_parts
+from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_parts, suite_settings
 
 SHORT: Final = {
     "gyro": "gyro",
@@ -35,9 +35,9 @@ def subject(name: str) -> Subject:
         return _suite(suites[_plain(name)])
     if name.endswith(".toml"):
         return _suite(name) if _is_suite(name) else _part(load_part(name))
-    known = {_plain(part): part for part in [*part_names(), *suites, "perfect"]}
-    if _plain(name) not in known:
-        hint = near_misses(_plain(name), known)
+    known = [*part_names(), *SUITES, "perfect"]
+    if _plain(name) not in map(_plain, known):
+        hint = near_misses(name, known)
         raise ValueError(f"unknown part or suite {name!r}: {hint} (one's own: path/to/part.toml)")
     return _part(load_part(name))
 
@@ -63,7 +63,7 @@ def _suite(name: str) -> Subject:
     summary = members.pop("summary")
     fitted = load_suite(name)
     devices = {kind: getattr(fitted, kind) for kind in KINDS if getattr(fitted, kind) is not None}
-    return Subject(name, summary, "", members, devices, MappingProxyType({}))
+    return Subject(name, summary, "", members, devices, MappingProxyType({}), suite_settings(name), fitted.board)
 
 
 def to_json() -> dict[str, Any]:

@@ -5,7 +5,7 @@ Printed and as JSON.  What it does is tried out in `scenarios.harness.sensor_tri
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
 from scenarios.harness import console, sensor_trial
@@ -20,6 +20,7 @@ from scenarios.harness.sensor_trial import (
 )
 from sim.log import Log
 from sim.params import unit_of, words_of
+from sim.sensors.board import BoardParams
 
 FORMATS: Final = (".png", ".svg", ".pdf")
 DRIFT_S: Final = 60.0
@@ -37,6 +38,8 @@ class Subject:
 
     members : kind -> part, of a suite; empty for a part      devices : kind -> parameters
     sources : ``kind.field`` -> where the figure comes from; empty where there is no data sheet
+    settings : of a suite, what it says of its board, its converter and single figures, by dotted names
+    board : that the parts sit on
     """
 
     name: str
@@ -45,6 +48,8 @@ class Subject:
     members: Mapping[str, str]
     devices: Mapping[str, Any]
     sources: Mapping[str, str]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    board: BoardParams = field(default_factory=BoardParams)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +69,14 @@ class Page:
         data: dict[str, Any] = {"suite" if about.members else "part": about.name, "about": about.about}
         if about.members:
             data["members"] = dict(about.members)
+            data["settings"] = {name: _plain(value) for name, value in about.settings.items()}
         else:
             data["datasheet"] = about.datasheet
         for kind, params in about.devices.items():
             figures = {f.name: _plain(getattr(params, f.name)) for f in fields(params)}
-            data[kind] = self._measured(kind) | {"figures": figures}
+            cited = {f.name: about.sources.get(f"{kind}.{f.name}") for f in fields(params)}
+            sources = {name: source for name, source in cited.items() if source}
+            data[kind] = self._measured(kind) | {"figures": figures, "sources": sources}
         return data
 
     def _measured(self, kind: str) -> dict[str, Any]:
@@ -84,7 +92,9 @@ class Page:
         """What the sensor does to a signal: what, how much, unit."""
         params = self.subject.devices[kind]
         if kind in self.at_rest:
-            return _inertial_effects(kind, params, self.at_rest[kind])
+            return _inertial_effects(kind, params, self.at_rest[kind]) + _supply_effects(
+                kind, params, self.subject.board
+            )
         if kind == "gps" and self.response is not None:
             return _gps_effects(params, self.response)
         if kind == "magnetometer" and self.magnetic is not None:
@@ -133,6 +143,14 @@ def make(
     )
 
 
+def check_rates(subject: Subject, name: str) -> None:
+    """Refuse, before anything is computed, a sensor whose rate the trials cannot run at: ValueError with its `name`."""
+    try:
+        sensor_trial.check_rates(subject.devices)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
 def _inertial_effects(kind: str, params: Any, rest: AtRest) -> list[Row]:
     """Of a gyro or an accelerometer, in the unit of its full scale."""
     rows: list[Row]
@@ -155,6 +173,20 @@ def _inertial_effects(kind: str, params: Any, rest: AtRest) -> list[Row]:
             ("tilt by the bias, sigma", math.degrees(math.atan(params.bias_g)), "deg"),
         ]
     return rows
+
+
+def _supply_effects(kind: str, params: Any, board: BoardParams) -> list[Row]:
+    """What an analogue part reads at rest where its voltage and the converter's do not go together with the supply."""
+    power = board.supply_power(params.output)
+    if power == 0:
+        return []
+    null, unit = (params.null_deg_s, "deg/s") if kind == "gyro" else (params.null_g, "g")
+    wrong = (("high, its sigma", board.supply_tolerance), ("low, full throttle", -board.supply_sag))
+    return [
+        (f"at rest, supply {100.0 * abs(e):.2g} % {why}", null * ((1.0 + e) ** power - 1.0), unit)
+        for why, e in wrong
+        if e
+    ]
 
 
 def _gps_effects(params: Any, response: Response) -> list[Row]:
@@ -210,6 +242,9 @@ def tell(page: Page) -> None:
     if about.members:
         rows = [[_title(kind), part] for kind, part in about.members.items()]
         out.print(console.table("Members", ("", ""), rows, text=(0, 1)))
+    if about.settings:
+        rows = [[_setting(name), _number(value), unit_of(name)] for name, value in about.settings.items()]
+        out.print(console.table("Board and changes", ("", "", ""), rows, text=(0, 2)))
     for kind in about.devices:
         if not about.members:
             out.print(_figures(about, kind))
@@ -221,6 +256,12 @@ def tell(page: Page) -> None:
 
 def _title(kind: str) -> str:
     return "GPS" if kind == "gps" else kind.capitalize()
+
+
+def _setting(name: str) -> str:
+    """A dotted name in words, its part first."""
+    part, _, figure = name.rpartition(".")
+    return f"{part.replace('.', ' ')}: {words_of(figure)}"
 
 
 def _figures(about: Subject, kind: str) -> Any:
@@ -252,7 +293,7 @@ def _percent(c: Coefficient) -> str:
 
 
 def _number(value: Any) -> str:
-    if isinstance(value, tuple):
+    if isinstance(value, (tuple, list)):
         return ", ".join(_number(v) for v in value)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value)

@@ -22,6 +22,7 @@ from sim.rng import stream
 from sim.sensors import accelerometer, allan, gyro
 from sim.sensors.board import BoardParams
 from sim.sensors.datasheet import PERFECT
+from sim.sensors.device import noise_filter
 from sim.sensors.gps import GpsParams
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.noise import STANDARD_GRAVITY_M_S2
@@ -90,6 +91,7 @@ class AtRest:
     noise : fitted to their mean
     figures : noise density, bias instability and random walk of the part file, zero where that is silent
     step : of a reading, the averaging of conversions included; 0 where nothing is quantised
+    noise_gain : sigma of the white noise of a reading, against that before low-pass filter and conversions
     """
 
     kind: str
@@ -100,6 +102,7 @@ class AtRest:
     noise: allan.NoiseModel
     figures: tuple[float, float, float]
     step: float
+    noise_gain: float
 
     @property
     def stated(self) -> allan.NoiseModel:
@@ -120,8 +123,8 @@ class AtRest:
 
     @property
     def sample_sigma(self) -> float:
-        """Sigma of the white noise of one sample."""
-        return self.noise.white * math.sqrt(IMU_HZ)
+        """Sigma of the white noise of one reading, what folds down from above the sample rate included."""
+        return self.noise_gain * self.noise.white * math.sqrt(IMU_HZ)
 
     @property
     def walk_is_hidden(self) -> bool:
@@ -158,9 +161,11 @@ def at_rest(
             told()
     tau_s, variances = m / IMU_HZ, np.concatenate(found, axis=1)
     hours = variances.shape[1] * seconds / 3600.0
+    _, noise_gain = noise_filter(params.bandwidth_hz, params.conversions, IMU_HZ)
     return AtRest(
-        kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), figures(kind, params), step(kind, params)
-    )
+        kind, how.unit, hours, tau_s, variances, allan.fit(tau_s, variances), figures(kind, params), step(kind, params),
+        noise_gain,
+    )  # fmt: skip
 
 
 def figures(kind: str, params: Any) -> tuple[float, float, float]:
@@ -266,6 +271,16 @@ def fitted(devices: Mapping[str, Any]) -> SuiteParams:
     """A suite of `devices`, kind -> parameters; gyro, accelerometer and GPS are perfect where not named."""
     always = {kind: PERFECT[kind] for kind in ("gyro", "accelerometer", "gps")}
     return SuiteParams(**(always | dict(devices)))
+
+
+def check_rates(devices: Mapping[str, Any]) -> None:
+    """Refuse a sensor that reports at a rate which the trials' clock has not: ValueError."""
+    rates = Rates(imu_hz=IMU_HZ)
+    for kind, params in devices.items():
+        if kind == "gps":
+            Rates(imu_hz=IMU_HZ, gps_hz=params.rate_hz)
+        elif kind not in INERTIAL:
+            rates.steps_per_sample(kind, params.rate_hz)
 
 
 def fly(params: SuiteParams, motion: Any, seconds: float, rates: Rates, quiet: bool = False) -> Log:

@@ -16,7 +16,7 @@ import numpy as np
 import pymap3d
 from numpy.typing import NDArray
 
-from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
+from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG, YEAR
 
 Array = NDArray[np.float64]
 NAN: Final = float("nan")
@@ -33,7 +33,8 @@ class Place(NamedTuple):
 
 
 LAUNCH: Final = Place(LATITUDE_DEG, LONGITUDE_DEG, ELEVATION_M)
-START: Final = datetime(2025, 6, 1, 12, tzinfo=UTC)
+_NEW_YEAR: Final = datetime(int(YEAR), 1, 1, tzinfo=UTC)
+START: Final = _NEW_YEAR + YEAR % 1.0 * (datetime(int(YEAR) + 1, 1, 1, tzinfo=UTC) - _NEW_YEAR)
 """When the power came up, unless told otherwise: fixed, so that the same flight gives the same file."""
 
 SATELLITES: Final = 12

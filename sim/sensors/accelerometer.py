@@ -16,7 +16,7 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams, warming
-from sim.sensors.device import distort, on_supply, quantise, rate_shape, shake, step_filter
+from sim.sensors.device import carry, distort, filter_noise, on_supply, quantise, shake, step_filter
 from sim.sensors.noise import (
     FLICKER_TIMES_S,
     STANDARD_GRAVITY_M_S2,
@@ -137,14 +137,18 @@ def measure_force(truth, measured, noise, k, unit, board, memory, state):  # typ
     if unit.filters or unit.shakes or unit.off_centre:
         feel_force(truth, k, unit, board, memory, state)
         force = memory.signal
+    found = errors.force_noise_b_m_s2
+    if unit.noise_filters:
+        filter_noise(found, noise[max(k - 1, 0)].force_noise_b_m_s2, k, unit, memory.noise)
+        found = memory.noise
     for i in range(3):
         bias = errors.force_bias_b_m_s2[i]
         turned = unit.M[i, 0] * force[0] + unit.M[i, 1] * force[1] + unit.M[i, 2] * force[2]
         if unit.distorts:
-            sensed = distort(turned, i, unit, state) + bias + errors.force_noise_b_m_s2[i]
+            sensed = distort(turned, i, unit, state) + bias + found[i]
             sensed, bias = on_supply(sensed, unit, state), on_supply(bias, unit, state)
         else:
-            sensed = turned + bias + errors.force_noise_b_m_s2[i]
+            sensed = turned + bias + found[i]
         measured[k].force_b_m_s2[i] = quantise(sensed, unit)
         row.force_bias_b_m_s2[i] = bias
 
@@ -175,25 +179,3 @@ def feel_force(truth, k, unit, board, memory, state):  # type: ignore[no-untyped
             signal[i] = mean - (after - before) * unit.low_pass[4]
     if unit.shakes:
         shake(unit, board, state, signal)
-
-
-@kernel
-def carry(truth, k, board, force):  # type: ignore[no-untyped-def]
-    """Add to `force`, shape (3,), what the lever arm r adds: the mean of omega x (omega x r) + d(omega)/dt x r.
-
-    omega x (omega x r) = omega (omega . r) - r omega^2.  The rate is the parabola m + d/2 P1 + q P2 of
-    `rate_shape`, so that the mean of omega_i omega_j is m_i m_j + d_i d_j / 12 + q_i q_j / 5 exactly.
-    """
-    r, m = board.lever_arm_b_m, truth[k].imu_omega_b_rad_s
-    dx, qx = rate_shape(truth, k, 0)
-    dy, qy = rate_shape(truth, k, 1)
-    dz, qz = rate_shape(truth, k, 2)
-    xx = m[0] * m[0] + dx * dx / 12.0 + qx * qx / 5.0
-    yy = m[1] * m[1] + dy * dy / 12.0 + qy * qy / 5.0
-    zz = m[2] * m[2] + dz * dz / 12.0 + qz * qz / 5.0
-    xy = m[0] * m[1] + dx * dy / 12.0 + qx * qy / 5.0
-    xz = m[0] * m[2] + dx * dz / 12.0 + qx * qz / 5.0
-    yz = m[1] * m[2] + dy * dz / 12.0 + qy * qz / 5.0
-    force[0] += xy * r[1] + xz * r[2] - (yy + zz) * r[0] + (dy * r[2] - dz * r[1]) / board.dt_s
-    force[1] += xy * r[0] + yz * r[2] - (xx + zz) * r[1] + (dz * r[0] - dx * r[2]) / board.dt_s
-    force[2] += xz * r[0] + yz * r[1] - (xx + yy) * r[2] + (dx * r[1] - dy * r[0]) / board.dt_s

@@ -70,6 +70,7 @@ class BarometerParams:
     lag_s : time constant with which the height follows; 0 is none
     noise_pa : sigma of each sample      drift_pa_min : sigma of the steady drift of weather and temperature
     wander_pa : sigma of the slowly wandering error      wander_s : correlation time of that error
+    range_pa : full scale of the pressure, 0 its other end; infinite is none
     step_pa : one step of the converter; 0 is not quantised
     """
 
@@ -79,14 +80,16 @@ class BarometerParams:
     drift_pa_min: float = 0.0
     wander_pa: float = 0.0
     wander_s: float = 30.0
+    range_pa: float = math.inf
     step_pa: float = 0.0
 
     def __post_init__(self) -> None:
         require(self, "Hz", "rate_hz", least=0.1)
         require(self, "s", "lag_s")
         require(self, "s", "wander_s", least=0.001)
-        require(self, "Pa", "noise_pa", "wander_pa", "step_pa")
+        require(self, "Pa", "noise_pa", "wander_pa")
         require(self, "Pa/min", "drift_pa_min")
+        require_scale(self, "Pa", "range_pa", "step_pa")
 
 
 UNIT = np.dtype(
@@ -101,6 +104,7 @@ UNIT = np.dtype(
         ("axial", "i8"),
         ("range_pa", "f8"),
         ("airspeed_step_pa", "f8"),
+        ("baro_range_pa", "f8"),
         ("baro_step_pa", "f8"),
         ("before", "f8"),  # weight of the lagged height at the start of a tick,
         ("start", "f8"),  # of the true height there,
@@ -137,7 +141,7 @@ def make(
         unit["range_pa"], unit["airspeed_step_pa"] = airspeed.range_pa, airspeed.step_pa
     if barometer is not None:
         unit["baro_steps"] = rates.steps_per_sample("barometer", barometer.rate_hz)
-        unit["baro_step_pa"] = barometer.step_pa
+        unit["baro_range_pa"], unit["baro_step_pa"] = barometer.range_pa, barometer.step_pa
         step = rates.dt_s / barometer.lag_s if barometer.lag_s > 0.0 else math.inf
         before, end = math.exp(-step), 1.0 + math.expm1(-step) / step
         unit["before"], unit["start"], unit["end"] = before, 1.0 - before - end, end
@@ -185,7 +189,7 @@ def measure_air(truth, measured, noise, k, unit, memory):  # type: ignore[no-unt
         if step > k * spt:
             late = (step - k * spt) / spt
             height = (1.0 - late) * memory.height_was_m + late * memory.height_m
-            row.baro_height_m = _height_m(height, noise[k].baro_error_pa, unit.baro_step_pa)
+            row.baro_height_m = _height_m(height, noise[k].baro_error_pa, unit)
             row.air_new = 1
 
 
@@ -204,12 +208,18 @@ def _airspeed_m_s(speed_m_s, noise_pa, unit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _height_m(height_m, error_pa, step_pa):  # type: ignore[no-untyped-def]
+def _height_m(height_m, error_pa, unit):  # type: ignore[no-untyped-def]
     """What the barometer makes of the height `height_m` above the launch point."""
-    if error_pa == 0.0 and step_pa == 0.0:
+    if error_pa == 0.0 and unit.baro_step_pa == 0.0 and np.isinf(unit.baro_range_pa):
         return height_m  # there and back would cost digits
-    pressure = _quantised(_pressure_pa(place.ELEVATION_M + height_m) + error_pa, step_pa)
-    return TEMPERATURE_K / LAPSE_K_M * (1.0 - (pressure / PRESSURE_PA) ** (1.0 / _EXPONENT)) - place.ELEVATION_M
+    pressure = min(max(_pressure_pa(place.ELEVATION_M + height_m) + error_pa, 0.0), unit.baro_range_pa)
+    return height_at_m(_quantised(pressure, unit.baro_step_pa))
+
+
+@kernel
+def height_at_m(pressure_pa):  # type: ignore[no-untyped-def]
+    """Height above the launch point at which the standard atmosphere has this pressure."""
+    return TEMPERATURE_K / LAPSE_K_M * (1.0 - (pressure_pa / PRESSURE_PA) ** (1.0 / _EXPONENT)) - place.ELEVATION_M
 
 
 @kernel

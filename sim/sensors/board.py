@@ -21,7 +21,7 @@ MOST_SUPPLY_SAG = 0.4
 class BoardParams:
     """What gyro and accelerometer share.  The defaults are a perfect board at the centre of gravity.
 
-    lever_arm_b_m : (3,) from the centre of gravity to the accelerometer, body axes
+    lever_arm_b_m : (3,) from the centre of gravity to gyro and accelerometer, body axes
     mounting_deg : (3,) roll, pitch and yaw by which the board is crooked, and the firmware does not know it
     supply_tolerance : sigma of the supply voltage's relative error, constant in a flight
     supply_sag : relative fall of the supply at full throttle

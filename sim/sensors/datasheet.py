@@ -104,7 +104,7 @@ def load_part(name: str, folder: Path | None = None, files: Mapping[str, str] = 
         return read_part(str(path), read_text(path, files, "part"))
     known = {_plain(stem): stem for stem in part_names()}
     if _plain(name) not in known:
-        hint = near_misses(_plain(name), [*known, *_BUILT_IN])
+        hint = near_misses(name, [*known.values(), *_BUILT_IN])
         raise ValueError(f"unknown part {name!r}: {hint} (one's own: path/to/part.toml)")
     path = FOLDER / f"{known[_plain(name)]}.toml"
     return read_part(path.name, path.read_text(encoding="utf-8"))

@@ -27,7 +27,7 @@ from estimator.jit import kernel
 from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.sensors.board import BoardParams
-from sim.sensors.noise import Source
+from sim.sensors.noise import Source, sample_sigma
 
 # In SI units of the reading.  A flag for each group, so that what is off costs nothing.
 DEVICE: tuple[Any, ...] = (
@@ -39,6 +39,9 @@ DEVICE: tuple[Any, ...] = (
     ("shake_rad", "f8", (3,)),  # phase of each axis against the rotor
     ("bandwidth_hz", "f8"),
     ("conversions", "i8"),
+    ("noise_filters", "i8"),
+    ("noise_filter", "f8", (3,)),  # phi, b0, b1
+    ("noise_gain", "f8"),  # sigma of a sample's noise, against that of the mean over the tick of unfiltered noise
     ("distorts", "i8"),  # any of the terms from here to the converter
     ("gain_per_k", "f8", (3,)),
     ("bend", "f8", (3,)),  # largest deviation from the straight line
@@ -52,6 +55,7 @@ DEVICE: tuple[Any, ...] = (
 MEMORY: tuple[Any, ...] = (
     ("filtered", "f8", (3,)),  # output of the low-pass filter at the end of the tick
     ("signal", "f8", (3,)),  # mean over the tick of what reaches the part's output
+    ("noise", "f8", (3,)),  # what the converter finds of the noise
 )
 
 
@@ -79,9 +83,35 @@ def low_pass(bandwidth_hz: float, dt_s: float) -> Array:
 def noise_of_one_conversion(density_sqrt_hz: float, bandwidth_hz: float, conversions: int, imu_hz: float) -> float:
     """Sigma of one conversion under a one-sided noise density: over the filter's noise bandwidth, pi/2 times its own.
 
-    Without a filter, the density of a sample holds: the mean of n conversions has 1 / n of the power of one.
+    Without a filter the density of a sample holds: the mean of n conversions has 1 / n of the power of one.
     """
-    return density_sqrt_hz * math.sqrt(min(math.pi / 2.0 * bandwidth_hz, conversions * imu_hz / 2.0))
+    noise_hz = conversions * imu_hz / 2.0 if math.isinf(bandwidth_hz) else math.pi / 2.0 * bandwidth_hz
+    return density_sqrt_hz * math.sqrt(noise_hz)
+
+
+def noise_filter(bandwidth_hz: float, conversions: int, imu_hz: float) -> tuple[Array, float]:
+    """What a low-pass filter and a few conversions in each tick make of white noise: phi, b0, b1; and its sigma.
+
+    A part samples the noise behind its filter, autocorrelation exp(-2 pi bandwidth |lag|), at the middles of equal
+    parts of the tick.  The mean of those has autocovariances r0, r1, phi r1, phi^2 r1, ... a tick apart: it is the
+    process x(k) = phi x(k-1) + b0 w(k) + b1 w(k-1) of unit white noise w (Box and Jenkins, Time Series Analysis,
+    1970, ARMA(1, 1)), with b0^2 + b1^2 = (1 + phi^2) r0 - 2 phi r1 and b0 b1 = r1 - phi r0.  All is relative to
+    `sample_sigma`.  Where a fast signal is sampled once, noise from above the sample rate folds down and sigma
+    exceeds 1; a continuous mean (0 conversions) or no filter leaves the noise as it is.
+    """
+    n = conversions
+    if n == 0 or math.isinf(bandwidth_hz):
+        return np.array([0.0, 1.0, 0.0]), 1.0
+    variance = (noise_of_one_conversion(1.0, bandwidth_hz, n, imu_hz) / sample_sigma(1.0, imu_hz)) ** 2
+    a = 2.0 * math.pi * bandwidth_hz / imu_hz
+    apart = np.arange(1, 2 * n)  # of two conversions, in n-ths of a tick
+    alike = np.exp(-a / n * apart)
+    r0 = variance * (n + 2.0 * np.sum((n - apart[: n - 1]) * alike[: n - 1])) / n**2
+    r1 = variance * np.sum((n - np.abs(apart - n)) * alike) / n**2
+    phi = math.exp(-a)
+    total = math.sqrt((1.0 - phi) * ((1.0 - phi) * r0 + 2.0 * r1))  # b0 + b1
+    difference = math.sqrt((1.0 + phi) * ((1.0 + phi) * r0 - 2.0 * r1))  # b0 - b1
+    return np.array([phi, 0.5 * (total + difference), 0.5 * (total - difference)]), math.sqrt(r0)
 
 
 def converter(step: float, full_scale: float, bits: int, conversions: int, sigma: float) -> tuple[float, float, float]:
@@ -118,6 +148,8 @@ def make(
     unit["shakes"], unit["shake"], unit["conversions"] = shake > 0.0, shake, params.conversions
     if shake:
         unit["shake_rad"] = source(f"{name} vibration").uniform(0.0, 2.0 * math.pi, 3)
+    unit["noise_filter"], unit["noise_gain"] = noise_filter(params.bandwidth_hz, params.conversions, rates.imu_hz)
+    unit["noise_filters"] = params.conversions > 0 and math.isfinite(params.bandwidth_hz)
     unit["gain_per_k"] = drawn("gain temperature", params.gain_per_k)
     if math.isfinite(full_scale):  # a fraction of no full scale is nothing
         unit["bend"] = drawn("non-linearity", params.nonlinearity * full_scale)
@@ -135,6 +167,17 @@ def step_filter(weights, before, mean, rise, bulge):  # type: ignore[no-untyped-
 
 
 @kernel
+def filter_noise(fresh, before, k, unit, found):  # type: ignore[no-untyped-def]
+    """Noise of tick k as the converter finds it, into `found`, from that drawn for this tick and the one `before`.
+
+    See `noise_filter`; at power-up the filter has its own sigma already.
+    """
+    phi, b0, b1 = unit.noise_filter[0], unit.noise_filter[1], unit.noise_filter[2]
+    for i in range(3):
+        found[i] = phi * found[i] + b0 * fresh[i] + b1 * before[i] if k > 0 else unit.noise_gain * fresh[i]
+
+
+@kernel
 def rate_shape(truth, k, i):  # type: ignore[no-untyped-def]
     """Rise and bulge over tick k of the rate about axis i, from its mean and its values at both ends.
 
@@ -143,6 +186,28 @@ def rate_shape(truth, k, i):  # type: ignore[no-untyped-def]
     mean, end = truth[k].imu_omega_b_rad_s[i], truth[k].omega_b_rad_s[i]
     start = truth[k - 1].omega_b_rad_s[i] if k > 0 else 2.0 * mean - end
     return end - start, 0.5 * (start + end) - mean
+
+
+@kernel
+def carry(truth, k, board, force):  # type: ignore[no-untyped-def]
+    """Add to `force`, shape (3,), what the lever arm r adds: the mean of omega x (omega x r) + d(omega)/dt x r.
+
+    omega x (omega x r) = omega (omega . r) - r omega^2.  The rate is the parabola m + d/2 P1 + q P2 of
+    `rate_shape`, so that the mean of omega_i omega_j is m_i m_j + d_i d_j / 12 + q_i q_j / 5 exactly.
+    """
+    r, m = board.lever_arm_b_m, truth[k].imu_omega_b_rad_s
+    dx, qx = rate_shape(truth, k, 0)
+    dy, qy = rate_shape(truth, k, 1)
+    dz, qz = rate_shape(truth, k, 2)
+    xx = m[0] * m[0] + dx * dx / 12.0 + qx * qx / 5.0
+    yy = m[1] * m[1] + dy * dy / 12.0 + qy * qy / 5.0
+    zz = m[2] * m[2] + dz * dz / 12.0 + qz * qz / 5.0
+    xy = m[0] * m[1] + dx * dy / 12.0 + qx * qy / 5.0
+    xz = m[0] * m[2] + dx * dz / 12.0 + qx * qz / 5.0
+    yz = m[1] * m[2] + dy * dz / 12.0 + qy * qz / 5.0
+    force[0] += xy * r[1] + xz * r[2] - (yy + zz) * r[0] + (dy * r[2] - dz * r[1]) / board.dt_s
+    force[1] += xy * r[0] + yz * r[2] - (xx + zz) * r[1] + (dz * r[0] - dx * r[2]) / board.dt_s
+    force[2] += xz * r[0] + yz * r[1] - (xx + yy) * r[2] + (dx * r[1] - dy * r[0]) / board.dt_s
 
 
 @kernel

@@ -12,11 +12,12 @@ outage          the same for a GPS: no new fix, the last good one is held
 nan             what arrives is no number
 spikes          a share of the readings is off by an amplitude, up or down; of a GPS, its position in any direction
 bias, gain      readings are off by an amount, or multiplied by a factor
-saturated       reads its full scale
+saturated       reads its full scale, or what the part reads beyond it where it tells an overflow; a barometer's is
+                that of the pressure, so that 1 reads low
 jump            the position of the fixes is displaced
 frozen_course   fixes keep the course last reported, 0 before the first, and their velocity points along it
 
-A reading that is off stays within the full scale of its part.
+A reading that is off stays within the full scale of its part, or overflows as the part does.
 """
 
 import math
@@ -31,7 +32,9 @@ from numpy.typing import NDArray
 
 from estimator.interface import Array
 from estimator.jit import kernel
+from sim import params
 from sim.clock import Rates
+from sim.sensors.air_data import height_at_m
 from sim.sensors.device import quantise
 from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Source
 from sim.sensors.receiver import hold
@@ -79,6 +82,7 @@ _FULL_SCALES: Final = {
     "accelerometer": "range_g",
     "magnetometer": "range_ut",
     "airspeed": "range_pa",
+    "barometer": "range_pa",
 }
 _AIR: Final = ("airspeed", "barometer")
 _OF_READINGS: Final = ("stuck", "dropout", "nan", "spikes", "bias", "gain", "saturated")
@@ -184,8 +188,12 @@ def require_possible(fault: Fault, suite: Any) -> None:
     part = getattr(suite, fault.part)
     if part is None:
         raise ValueError(f"fault {fault}: no {fault.part} is fitted; choose a suite that has one")
-    if fault.kind == "saturated" and not math.isfinite(getattr(part, _FULL_SCALES.get(fault.part, ""), math.inf)):
-        raise ValueError(f"fault {fault}: this {fault.part} has no full scale; choose another suite, or bias")
+    if fault.kind == "saturated" and not math.isfinite(getattr(part, _FULL_SCALES[fault.part])):
+        field = f"{fault.part}.{_FULL_SCALES[fault.part]}"
+        raise ValueError(
+            f"fault {fault}: this {fault.part} has no full scale; set {field} to a finite number of "
+            f"{params.unit_of(field)}, or choose a suite whose {fault.part} has one, or bias"
+        )
 
 
 FAULT = np.dtype(
@@ -197,6 +205,8 @@ FAULT = np.dtype(
         ("value", "f8"),
         ("least", "f8"),  # the ends of the full scale
         ("most", "f8"),
+        ("under", "f8"),  # what is read beyond them
+        ("over", "f8"),
     ],
     align=True,
 )
@@ -217,10 +227,11 @@ def fault_table(
     table = np.zeros((n, len(columns)), FAULT)
     for j, (fault, axis, values) in enumerate(columns):
         first, end = (_first_tick(t_s + release_s, rates.imu_hz, n) for t_s in (fault.from_s, fault.to_s))
-        least, most = _span(fault.part, unit[0])
+        least, most, under, over = _span(fault.part, unit[0])
         kind = Kind[fault.kind.upper()]
         if kind is Kind.SATURATED:
-            values = np.where(values > 0.0, most, least)
+            high, low = (under, over) if fault.part == "barometer" else (over, under)  # most pressure is least height
+            values = np.where(values > 0.0, high, low)
         wrong = table[first:end, j]
         hit = _sampled(fault.part, rates, unit[0], n)
         if kind is Kind.SPIKES:
@@ -228,6 +239,7 @@ def fault_table(
         wrong["kind"] = np.where(hit[first:end], kind, 0)
         wrong["part"], wrong["axis"], wrong["before"] = _PARTS[fault.part].code, axis, max(first - 1, 0)
         wrong["value"], wrong["least"], wrong["most"] = values[first:end], least, most
+        wrong["under"], wrong["over"] = under, over
     return table
 
 
@@ -265,24 +277,29 @@ def _sampled(part: str, rates: Rates, unit: np.void, n: int) -> NDArray[np.bool_
     return sampled
 
 
-def _span(part: str, unit: np.void) -> tuple[float, float]:
-    """Lowest and highest reading of a part, in SI; infinite where nothing ends them."""
+def _span(part: str, unit: np.void) -> tuple[float, float, float, float]:
+    """Lowest and highest reading of a part, in SI, and what it reads beyond them; infinite where nothing ends them."""
+    least, most = -math.inf, math.inf
     if part in ("gyro", "accelerometer"):
-        return quantise(-math.inf, unit[part]), quantise(math.inf, unit[part])
-    if part == "magnetometer":
+        least, most = quantise(-math.inf, unit[part]), quantise(math.inf, unit[part])
+    elif part == "magnetometer":
         count = float(unit[part]["step_ut"]) or 1.0
-        return count * float(unit[part]["lowest"]), count * float(unit[part]["highest"])
-    if part == "airspeed":
-        return 0.0, math.sqrt(2.0 * float(unit["air"]["range_pa"]) / float(unit["air"]["density_kg_m3"]))
-    return -math.inf, math.inf
+        least, most = count * float(unit[part]["lowest"]), count * float(unit[part]["highest"])
+        if unit[part]["overflow"]:
+            return least, most, count * float(unit[part]["overflow"]), count * float(unit[part]["overflow"])
+    elif part == "airspeed":
+        least, most = 0.0, math.sqrt(2.0 * float(unit["air"]["range_pa"]) / float(unit["air"]["density_kg_m3"]))
+    elif part == "barometer" and math.isfinite(unit["air"]["baro_range_pa"]):
+        least, most = height_at_m(float(unit["air"]["baro_range_pa"])), height_at_m(0.0)
+    return least, most, least, most
 
 
 @kernel
 def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
     """Do to the measured row `k` what is wrong in it, in order; `faults` is shape (n, m) of FAULT.
 
-    What is added to an inertial reading is added to its bias in the truth too, and a gain multiplies both: the
-    bias is what the sensor reads too much.
+    The bias in the truth is what gyro and accelerometer read without a signal and without noise: a bias is added to
+    it, a gain multiplies it.  All other kinds leave it: it stays that of the part which they hide.
     """
     row = measured[k]
     for j in range(faults.shape[1]):
@@ -324,12 +341,14 @@ def _wrong(reading, before, fault):  # type: ignore[no-untyped-def]
     if fault.kind == Kind.SATURATED:
         return fault.value
     off = reading * fault.value if fault.kind == Kind.GAIN else reading + fault.value
-    return off if np.isnan(off) else min(max(off, fault.least), fault.most)
+    if off < fault.least:
+        return fault.under
+    return fault.over if off > fault.most else off
 
 
 @kernel
 def _wrong_bias(bias, fault):  # type: ignore[no-untyped-def]
-    """What the sensor reads too much, beside what it does without the fault."""
+    """What the sensor reads without a signal, where it reads `bias` without the fault."""
     if fault.kind == Kind.BIAS:
         return bias + fault.value
     return bias * fault.value if fault.kind == Kind.GAIN else bias

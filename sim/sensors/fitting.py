@@ -85,6 +85,16 @@ def suite_parts(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str
     return {key: data[key] for key in ("summary", *KINDS) if key in data}
 
 
+def suite_settings(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, Any]:
+    """What the suite `name` or a file says of its board, its converter and single figures: dotted name -> value."""
+    file, data = _read(name, files)
+    board = dict(_table(file, "board", data))
+    converter = board.pop("converter", {})
+    settings = {f"board.{key}": value for key, value in board.items()}
+    settings |= {f"board.converter.{key}": value for key, value in converter.items()}
+    return settings | dict(_table(file, "changes", data))
+
+
 class _Suites(Mapping[str, SuiteParams]):
     """The suites that have a file here, each read when it is first asked for."""
 

@@ -3,9 +3,9 @@
 reading = convert(supply(curve(M omega + G f) + bias(t) + noise)),   M = (1 + diag(gain) + cross-axis) R_sb,
 bias(t) = turn-on + drift t + slope x warming(t) + flicker noise + random walk
 
-`omega` is the mean inertial rate over the tick.  The additive part bias(t) is what an estimator can learn as
-a bias; it is kept in the truth.  Terms as in IEEE Std 952 (rate ramp, bias instability, rate random
-walk, angle random walk).
+`omega` is the mean inertial rate over the tick, f the mean force where the board sits, without its vibration.
+The additive part bias(t) is what an estimator can learn as a bias; it is kept in the truth.  Terms as in IEEE Std
+952 (rate ramp, bias instability, rate random walk, angle random walk).
 """
 
 import math
@@ -18,7 +18,7 @@ from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams, warming
-from sim.sensors.device import distort, on_supply, quantise, rate_shape, shake, step_filter
+from sim.sensors.device import carry, distort, filter_noise, on_supply, quantise, rate_shape, shake, step_filter
 from sim.sensors.noise import (
     FLICKER_TIMES_S,
     STANDARD_GRAVITY_M_S2,
@@ -92,8 +92,8 @@ class GyroParams:
         require_converter(self, "deg/s", "range_deg_s")
 
 
-UNIT = np.dtype([*device.DEVICE, ("leans", "i8"), ("g_sensitivity", "f8", (3, 3))], align=True)
-MEMORY = np.dtype([*device.MEMORY], align=True)
+UNIT = np.dtype([*device.DEVICE, ("leans", "i8"), ("off_centre", "i8"), ("g_sensitivity", "f8", (3, 3))], align=True)
+MEMORY = np.dtype([*device.MEMORY, ("force", "f8", (3,))], align=True)  # mean over the tick, where the part sits
 NOISE = (("gyro_bias_b_rad_s", "f8", (3,)), ("gyro_noise_b_rad_s", "f8", (3,)))
 
 
@@ -109,6 +109,7 @@ def make(params: GyroParams, board: BoardParams, rates: Rates, source: Source, u
         sigma = math.radians(params.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2
         G = sigma * source("gyro g-sensitivity").standard_normal((3, 3))
         unit["leans"], unit["g_sensitivity"] = 1, G @ device.axes(board.mounting_deg)
+        unit["off_centre"] = any(board.lever_arm_b_m)
 
 
 def draw(params: GyroParams, board: BoardParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
@@ -147,17 +148,27 @@ def measure_rate(truth, measured, noise, k, unit, board, memory, state):  # type
     if unit.filters or unit.shakes:
         feel_rate(truth, k, unit, board, memory, state)
         omega = memory.signal
+    f = row.imu_force_b_m_s2
+    if unit.leans and unit.off_centre:
+        for i in range(3):
+            memory.force[i] = f[i]
+        carry(truth, k, board, memory.force)
+        f = memory.force
+    found = errors.gyro_noise_b_rad_s
+    if unit.noise_filters:
+        filter_noise(found, noise[max(k - 1, 0)].gyro_noise_b_rad_s, k, unit, memory.noise)
+        found = memory.noise
     for i in range(3):
         bias = errors.gyro_bias_b_rad_s[i]
         turned = unit.M[i, 0] * omega[0] + unit.M[i, 1] * omega[1] + unit.M[i, 2] * omega[2]
         if unit.leans:
-            f, G = row.imu_force_b_m_s2, unit.g_sensitivity
+            G = unit.g_sensitivity
             turned += G[i, 0] * f[0] + G[i, 1] * f[1] + G[i, 2] * f[2]
         if unit.distorts:
-            sensed = distort(turned, i, unit, state) + bias + errors.gyro_noise_b_rad_s[i]
+            sensed = distort(turned, i, unit, state) + bias + found[i]
             sensed, bias = on_supply(sensed, unit, state), on_supply(bias, unit, state)
         else:
-            sensed = turned + bias + errors.gyro_noise_b_rad_s[i]
+            sensed = turned + bias + found[i]
         measured[k].gyro_b_rad_s[i] = quantise(sensed, unit)
         row.gyro_bias_b_rad_s[i] = bias
 

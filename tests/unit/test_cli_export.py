@@ -56,6 +56,20 @@ def test_export_of_a_flight_reads_back_as_its_log(here: Path, capsys) -> None:
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_export_of_a_flight_whose_suite_file_is_gone_takes_what_the_recording_kept(tmp_path: Path, monkeypatch) -> None:
+    """As a flight is flown again; the accuracies are the root sums of squares of wander and noise of its receiver."""
+    monkeypatch.chdir(tmp_path)
+    suite = Path("mine.toml")
+    suite.write_text('summary = "mine"\ngyro = "itg3200"\naccelerometer = "bma180"\ngps = "ls20031"\n')
+    fly = ["fly", "hand_launch", "--sensors", "mine.toml", "--no-rerun", "--duration", "2", "--out", "flights"]
+    assert run(fly) in (0, 1)
+    suite.unlink()
+    assert run(["export", f"flights/{FLIGHT}", "--ubx", "fixes.ubx"]) == 0
+    fixes = gps_messages.read_ubx("fixes.ubx").fixes
+    # Two axes of 2.1 and 0.3 m, 3.2 and 0.5 m, 0.1 and 0.05 m/s.
+    assert (fixes.horizontal_acc_m[0], fixes.vertical_acc_m[0], fixes.speed_acc_m_s[0]) == (3.0, 3.239, 0.112)
+
+
 def test_export_json_tells_what_was_written(here: Path, capfd) -> None:
     """The newest flight where none is named, one format alone, JSON alone on standard output; the start as asked."""
     assert run(["export", "--ubx", "a.ubx", "--start", "2024-02-29T23:59:58", "--json", "-"]) == 0

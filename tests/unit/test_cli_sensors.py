@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 from scenarios.harness import sensor_names, sensor_page, sensor_trial
 from scenarios.harness.cli import run
 from sim.clock import Rates
+from sim.params import unit_of, words_of
+from sim.sensors.board import BoardParams
 from sim.sensors.datasheet import GENERIC, PERFECT, part_names
 from sim.sensors.fitting import SUITES
 from sim.sensors.gps import GpsParams
@@ -106,6 +109,7 @@ def test_picture_is_drawn(short, tmp_path, name, ending):
     ("arguments", "words"),
     [
         (["itg3201"], "did you mean itg3200"),
+        (["Devboard-Gren"], "did you mean devboard_green"),
         (["nonsense.toml"], "no such file"),
         (["itg3200", "--picture", "page.gif"], ".png, .svg, .pdf"),
         (["--picture", "page.png"], "name the part"),
@@ -117,6 +121,63 @@ def test_refusal_is_one_line_and_code_2(capsys, arguments, words):
     assert words in streams.err
     assert len(streams.err.splitlines()) == 1
     assert streams.out == ""
+
+
+@pytest.mark.parametrize(("kind", "rate_hz"), [("magnetometer", 75.0), ("gps", 7.0), ("barometer", 60.0)])
+def test_page_of_a_rate_that_cannot_be_tried_is_refused_in_one_line(tmp_path, capsys, kind, rate_hz):
+    """Before anything is computed, with the file and what would be right."""
+    part = tmp_path / "mine.toml"
+    part.write_text(
+        f'name = "Mine"\nmaker = "me"\nsummary = "mine"\ndatasheet = "none"\n[{kind}]\n'
+        f'rate_hz = {{ value = {rate_hz}, source = "typical" }}\n'
+    )
+    assert run(["sensors", str(part)]) == 2
+    streams = capsys.readouterr()
+    assert streams.out == ""
+    assert len(streams.err.splitlines()) == 1
+    assert f"mine.toml: {'GPS' if kind == 'gps' else kind} rate {rate_hz:g} Hz" in streams.err
+    assert "choose" in streams.err
+
+
+def test_json_says_where_each_figure_comes_from(short, tmp_path):
+    """So that a `datasheet` figure that is only typical can be told from one that the data sheet has."""
+    sources = page_json(tmp_path, "ms5611")["barometer"]["sources"]
+    assert sources["drift_pa_min"] == "typical"
+    assert "0.012 mbar" in sources["noise_pa"]
+
+
+def test_every_figure_with_a_unit_in_its_name_shows_it():
+    """Weather's drift is in Pa/min."""
+    assert (unit_of("drift_pa_min"), words_of("drift_pa_min")) == ("Pa/min", "drift")
+    assert (unit_of("noise_pa"), words_of("noise_pa")) == ("Pa", "noise")
+
+
+def test_no_two_figures_of_a_part_or_board_are_called_alike():
+    """Rows of one table with different units have different words."""
+    for params in [*GENERIC.values(), BoardParams()]:
+        words = [words_of(f.name) for f in fields(params)]
+        assert len(set(words)) == len(words), words
+    assert (words_of("bias_per_k_deg_s"), words_of("gain_per_k")) == ("bias per kelvin", "gain per kelvin")
+    assert (words_of("hard_iron_b_ut"), words_of("sensitivity_mv_g")) == ("hard iron, body axes", "sensitivity")
+
+
+def test_page_of_a_suite_has_its_board_its_changes_and_what_a_wrong_supply_reads(short, tmp_path, capsys):
+    """Green board: an absolute null through a ratiometric converter, V0 / (1 + e) - V0 of the null in deg/s."""
+    gyro = sensor_names.subject("adxrs401").devices["gyro"]
+    data = page_json(tmp_path, "devboard_green")
+    assert data["settings"]["board.supply_tolerance"] == 0.005
+    assert data["settings"]["board.converter.reference_v"] == 5.0
+    effects = data["gyro"]["effects"]
+    shift = gyro.null_deg_s * (1.0 / 1.005 - 1.0)
+    assert effects["at rest, supply 0.5 % high, its sigma (deg/s)"] == pytest.approx(shift, rel=1e-12)
+    assert effects["at rest, supply 0.2 % low, full throttle (deg/s)"] == pytest.approx(
+        gyro.null_deg_s * (1.0 / 0.998 - 1.0), rel=1e-12
+    )
+    assert not any("supply" in what for what in data["accelerometer"]["effects"])  # ratiometric as the converter
+    assert run(["sensors", "devboard_green"]) == 0
+    text = capsys.readouterr().out
+    for words in ("board: supply tolerance", "board converter: reference", "accelerometer: bias", "supply 0.5 % high"):
+        assert words in text
 
 
 def test_exercise_is_the_motion_it_says():
@@ -175,6 +236,13 @@ def test_sigma_of_a_sample_is_what_the_density_makes_at_50_hz():
     rest = sensor_trial.at_rest("gyro", GENERIC["gyro"], flights=2, seconds=600.0)
     expected = GENERIC["gyro"].noise_density_deg_s_sqrt_hz * math.sqrt(Rates().imu_hz / 2.0)
     assert rest.sample_sigma == pytest.approx(expected, rel=0.02)
+
+
+def test_sigma_of_a_sample_has_what_folds_down_into_it():
+    """ITG-3200, read once a tick: its density over the noise bandwidth of its filter, pi/2 42 Hz."""
+    params = sensor_names.subject("itg3200").devices["gyro"]
+    rest = sensor_trial.at_rest("gyro", params, flights=2, seconds=600.0)
+    assert rest.sample_sigma == pytest.approx(0.03 * math.sqrt(math.pi / 2.0 * 42.0), rel=0.02)
 
 
 def test_manual_lists_every_part_and_suite_and_its_examples_can_be_flown(tmp_path):

@@ -1,6 +1,7 @@
 """Faults of the sensors: what is typed, what is refused, and what each kind does to a row."""
 
 import math
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,6 +18,7 @@ from sim.log import TRUTH_DTYPE, Log
 from sim.place import ELEVATION_M
 from sim.rng import stream
 from sim.sensors.air_data import AirspeedParams, BarometerParams, density_kg_m3
+from sim.sensors.datasheet import load_part
 from sim.sensors.faults import CHANNELS, Fault, fault_table, kinds_of, spoil
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.suite import SUITES, Suite, SuiteParams
@@ -71,20 +73,20 @@ def readings(n=N):
     return rows
 
 
-def table_of(*faults, n=N, seed=3, release_s=RELEASE_S):
+def table_of(*faults, n=N, seed=3, release_s=RELEASE_S, fitted=FITTED):
     """The table of faults over `n` ticks, given as text."""
-    suite = Suite(FITTED, Rates(), seed)
+    suite = Suite(fitted, Rates(), seed)
     suite.reset(Log.empty(1))
     unit = suite.snapshot().unit
     return fault_table([parse_fault(f) for f in faults], release_s, Rates(), partial(stream, seed, 0), unit, n)
 
 
-def spoiled(*faults, rows=None, seed=3):
+def spoiled(*faults, rows=None, seed=3, fitted=FITTED):
     """Truth and measurements after the faults, what is not new held from the row before as sensors hold it."""
     clean = readings() if rows is None else rows
     truth, measured = np.zeros(len(clean), TRUTH_DTYPE), np.zeros(len(clean), MEASURED_DTYPE)
     truth["gyro_bias_b_rad_s"], truth["force_bias_b_m_s2"] = 0.01, 0.1
-    table = table_of(*faults, seed=seed)
+    table = table_of(*faults, seed=seed, fitted=fitted)
     for k in range(len(clean)):
         measured[k] = clean[k]
         held = [COLUMN[part] for part in EVERY if not is_sampled(part)[k]]
@@ -213,7 +215,14 @@ def test_fault_of_what_there_is_not_is_refused(arguments, words):
     ("changes", "words"),
     [
         ({"faults": ["mag:stuck@3"]}, "no magnetometer is fitted"),
-        ({"faults": ["gyro:saturated@3"], "suite": "ideal"}, "this gyro has no full scale"),
+        (
+            {"faults": ["gyro:saturated@3"], "suite": "ideal"},
+            "this gyro has no full scale; set gyro.range_deg_s to a finite number of deg/s, or choose a suite whose",
+        ),
+        (
+            {"faults": ["baro:saturated@3"], "suite": "ideal"},
+            "this barometer has no full scale; set barometer.range_pa to a finite number of Pa",
+        ),
         ({"faults": ["gyro:bias@3", "gyro:bias=5@3"]}, "named twice"),
         ({"faults": 7}, "faults = 7: write channel:kind"),
         ({"fault": "gyro:bias@3"}, "did you mean faults"),
@@ -309,6 +318,31 @@ def test_saturated_magnetometer_and_pitot_tube_read_their_full_scale():
     np.testing.assert_array_equal(measured["airspeed_m_s"][149:], 0.0)
 
 
+def test_saturated_compass_that_tells_an_overflow_reads_its_code():
+    """HMC5843: -4096 counts of 1/13 uT, at either end, and where a bias carries it past the range; not within."""
+    fitted = replace(FITTED, magnetometer=load_part("hmc5843").devices["magnetometer"])
+    code_ut = -4096 / 13.0
+    for text in ("saturated", "saturated=-1", "bias=9999", "bias=-9999", "gain=1e6"):
+        _, measured = spoiled(f"mag.y:{text}{WINDOW}", fitted=fitted)
+        np.testing.assert_allclose(measured["mag_b_ut"][104:149, 1], code_ut, rtol=0, atol=1e-6)
+    _, measured = spoiled(f"mag.y:bias=100{WINDOW}", fitted=fitted)
+    assert np.abs(measured["mag_b_ut"][104:149, 1] - 100.0).max() <= 1.0
+
+
+def test_saturated_barometer_reads_the_ends_of_its_pressure():
+    """1200 mbar of an MS5611, below the sea; no pressure, where the law ends; a bias carries it no lower."""
+    fitted = replace(FITTED, barometer=load_part("ms5611").devices["barometer"])
+    deepest_m = _height_m(1.2e5)
+    for text, height_m in (("saturated", deepest_m), ("saturated=-1", _height_m(0.0)), ("bias=-9999", deepest_m)):
+        _, measured = spoiled(f"baro:{text}{WINDOW}", fitted=fitted)
+        np.testing.assert_allclose(measured["baro_height_m"][109:149], height_m, rtol=0, atol=1e-6)
+
+
+def _height_m(pressure_pa):
+    """ISO 2533: T0 / L (1 - (p / p0)^(R L / g0))."""
+    return 288.15 / 0.0065 * (1.0 - (pressure_pa / 101325.0) ** (287.05287 * 0.0065 / 9.80665)) - ELEVATION_M
+
+
 @pytest.mark.parametrize("text", ["bias=9999", "gain=1e9", "spikes=9999,1"])
 def test_reading_that_is_off_stays_within_full_scale(text):
     """Nothing reads more than its converter can say."""
@@ -318,8 +352,8 @@ def test_reading_that_is_off_stays_within_full_scale(text):
     assert rate.max() == pytest.approx(full_scale * 511 / 512, rel=0, abs=1e-9)
 
 
-def test_true_bias_is_what_the_sensor_reads_too_much():
-    """A bias is added to it and a gain multiplies it; other kinds and other rows leave it."""
+def test_true_bias_is_what_the_sensor_reads_without_a_signal():
+    """A bias is added to it and a gain multiplies it; other kinds, spikes too, and other rows leave it."""
     truth, _ = spoiled(f"gyro.x:bias=2{WINDOW}", f"gyro.x:gain=3{WINDOW}", f"accel:bias=0.5{WINDOW}")
     expected = np.full((N, 3), 0.01)
     expected[IN, 0] = 3.0 * (0.01 + math.radians(2.0))

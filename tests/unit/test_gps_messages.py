@@ -21,7 +21,7 @@ from pyubx2 import UBX_PROTOCOL, UBXReader
 from estimator.interface import MEASURED_DTYPE
 from sim import gps_messages
 from sim.gps_messages import LAUNCH, START, Accuracy, Fixes, Place, decode_nmea, decode_ubx, encode_nmea, encode_ubx
-from sim.place import LATITUDE_DEG, LONGITUDE_DEG
+from sim.place import LATITUDE_DEG, LONGITUDE_DEG, YEAR
 
 KNOT_M_S = 1852 / 3600
 MINUTE = 1e-7  # unit of an NMEA minute
@@ -238,7 +238,7 @@ def test_nmea_minutes_never_round_up_to_sixty(angle_deg: float, text: bytes) -> 
 def test_course_just_below_north_is_zero_not_360() -> None:
     """359.9999 degrees and more rounds to north in both formats."""
     fix = one(v_e_m_s=(100.0, -1e-7, 0.0))
-    assert b",0.000,010625," in encode_nmea(fix)
+    assert b",0.000,020726," in encode_nmea(fix)
     assert decode_ubx(encode_ubx(fix)).fixes.course_rad[0] == 0.0
 
 
@@ -633,3 +633,9 @@ def test_fixes_are_independent_of_the_log() -> None:
     fixes = Fixes.from_log(rows)
     replace(fixes).p_e_m[:] = 1.0
     assert not rows["gps_p_e_m"].any()
+
+
+def test_power_comes_up_on_the_date_of_the_magnetic_field() -> None:
+    """The middle of 2026 is noon of 2 July, 182.5 of 365 days after new year."""
+    assert YEAR == 2026.5
+    assert datetime(2026, 7, 2, 12, tzinfo=UTC) == START

@@ -296,3 +296,17 @@ def test_impossible_parameter_is_refused(make, field, value, unit):
         make(**{field: value})
     assert str(error.value).startswith(f"{make.__name__}.{field} = {value!r} {unit}: choose ")
     assert "\n" not in str(error.value)
+
+
+def test_barometer_ends_at_its_full_scale():
+    """A pressure above it reads as the full scale does, one below it is as without, but for the way there and back."""
+    heights_m = np.linspace(-200.0, 200.0, 50)
+    limit_pa = 101325.0 * (1.0 - 0.0065 * -100.0 / 288.15) ** 5.2558797  # 100 m below the launch point, at sea level
+    read = heights(BarometerParams(rate_hz=50.0, range_pa=limit_pa), heights_m)
+    np.testing.assert_allclose(read, np.maximum(heights_m, -100.0), rtol=0, atol=1e-5)
+
+
+def test_barometer_full_scale_that_is_none_is_refused():
+    """With the unit and what would be right."""
+    with pytest.raises(ValueError, match=r"BarometerParams\.range_pa = 0\.0 Pa: choose a number above 0, or infinity"):
+        BarometerParams(range_pa=0.0)

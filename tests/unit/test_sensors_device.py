@@ -129,6 +129,22 @@ def test_gyro_leans_on_the_specific_force():
     assert abs(np.corrcoef(down.ravel(), forward.ravel())[0, 1]) <= 4.5 / math.sqrt(360)
 
 
+def test_gyro_leans_on_the_force_where_the_board_sits():
+    """At a steady turn the force at r is that at the centre of gravity and omega x (omega x r), which leans as well."""
+    r, omega, f = (0.1, -0.2, 0.05), (200.0, 100.0, -150.0), np.array(FORCE)
+    felt = f + np.cross(np.radians(omega), np.cross(np.radians(omega), r)) / G0
+
+    def leaned(force_g, arm):
+        both = [
+            read(omega, force_g, board=BoardParams(lever_arm_b_m=arm), g_sensitivity_deg_s_g=size)[0][0]
+            for size in (0.1, 0.0)
+        ]
+        return both[0] - both[1]
+
+    np.testing.assert_allclose(leaned(f, r), leaned(felt, (0.0, 0.0, 0.0)), rtol=0, atol=1e-13 * 200)
+    assert np.abs(leaned(f, r) - leaned(f, (0.0, 0.0, 0.0))).max() > 0.01
+
+
 @pytest.mark.parametrize(
     ("output", "ratiometric", "scale"),
     [
