@@ -115,7 +115,7 @@ def make(spec: str, params: Mapping[str, Any]) -> AttitudeEstimator:
     return type(estimator)(changed(before, values, f"estimator {spec}"))  # type: ignore[call-arg]
 
 
-def suited(spec: str, suits: Mapping[str, float]) -> dict[str, float]:
+def suited(spec: str, suits: Mapping[str, Any]) -> dict[str, Any]:
     """Those of a log's `suits` that the estimator `spec` has parameters for."""
     if not suits:
         return {}

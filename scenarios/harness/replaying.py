@@ -120,7 +120,7 @@ def tell(told: Told) -> None:
     for line in log.repairs:
         out.print(Text(f"repaired    {line}", "yellow"), soft_wrap=True)
     if log.suits:
-        suits = ", ".join(f"{name}={value:g}" for name, value in log.suits.items())
+        suits = ", ".join(f"{name}={_short(value)}" for name, value in log.suits.items())
         out.print(Text(f"set to suit {suits} (where an estimator has it, and --set does not say)"), soft_wrap=True)
     if log.reference is None:
         out.print(Text("no attitude in it to score against: --reference FILE"), soft_wrap=True)
@@ -154,3 +154,10 @@ def _free_folder(into: Path, name: str) -> Path:
             i += 1
         else:
             return path
+
+
+def _short(value: Any) -> str:
+    """A parameter in a few letters."""
+    if isinstance(value, list):
+        return "+".join(map(str, value))
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"

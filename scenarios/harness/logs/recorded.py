@@ -49,4 +49,4 @@ class RecordedLog:
     reference: Reference | None = None
     repairs: tuple[str, ...] = ()
     place: tuple[float, float] | None = None
-    suits: Mapping[str, float] = field(default_factory=dict)
+    suits: Mapping[str, Any] = field(default_factory=dict)

@@ -4,22 +4,32 @@ The input has a row per inertial sample in SI units, earth north-east-down, body
 of the interval, its length, mean rate and specific force, GPS velocity and position where a fix arrived, magnetic
 field in counts where a sample arrived, airspeed.  The attitudes (``*_truth``, or what the original firmware printed)
 are the nine elements of the body-to-earth rotation, row by row.
+
+Where the attitudes are what firmware printed, the input is rounded as that firmware got it, and `RecordedLog.suits`
+holds how that firmware was set, for the estimators that have such parameters.
 """
 
 import csv
 import gzip
 import io
+import math
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.ap_dcm_params import JULY_2013
 from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
 COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
 LEAST_FIX = 3  # a fix of three dimensions
+DECLINATION_DEG = {"E100": 0.0}  # of the field in the set; 10 in the others
+# What ArduPilot of July 2013 was given in steps: GPS in cm/s and hundredths of a degree, field in counts.
+STEPS = {
+    "gps_v_e_m_s": 0.01, "gps_speed_m_s": 0.01, "gps_course_rad": math.radians(0.01), "mag_b_ut": COUNT_UT,
+}  # fmt: skip
 INPUT = ("t", "dt", "gx", "gy", "gz", "ax", "ay", "az", "gps_new", "gps_vn", "gps_ve", "gps_vd", "gps_fix",
          "mag_new", "mx", "my", "mz", "airspeed", "gps_n", "gps_e", "gps_d")  # fmt: skip
 ATTITUDE = ("t", *(f"r{i}{j}" for i in range(3) for j in range(3)))
@@ -59,7 +69,26 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     instruments = ["gyro", "accelerometer"]
     instruments += [name for name, has in (("gps", fixes), ("magnetometer", rows["mag_new"])) if np.any(has)]
     instruments += ["airspeed"] if flown_through_air else []
-    return RecordedLog(rows, path.name, tuple(instruments), _reference(path, reference, table["t"]))
+    compared = _reference(path, reference, table["t"])
+    suits: dict[str, Any] = {"declination_rad": math.radians(DECLINATION_DEG.get(path.name.partition("_")[0], 10.0))}
+    if compared is not None and compared.kind == "firmware":
+        suits |= _as_set(compared.name)
+        if "_ap2013" in compared.name:
+            for column, step in STEPS.items():
+                rows[column] = step * np.rint(rows[column] / step)
+    return RecordedLog(rows, path.name, tuple(instruments), compared, suits=suits)
+
+
+def _as_set(output: str) -> dict[str, Any]:
+    """How the firmware was set that printed the file `output`, as parameters of `ap_dcm` and `matrixpilot`."""
+    if "_ap2013" in output:
+        return {
+            "quirks": sorted(JULY_2013),
+            "use_compass": "_mag" in output,
+            "fly_forward": "_copter" not in output,
+        }
+    classic = "_gpscent" in output
+    return {"centrifugal_from_gps": classic, "keep_tilt": not classic}
 
 
 def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | None:
