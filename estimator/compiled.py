@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.interface import AttitudeEstimate, Column, Health, Instrument, Measurements, dtype_of
-from estimator.jit import kernel
+from estimator.jit import inlined
 
 BELIEF = (
     Column("R_eb", (3, 3), "estimated body-to-earth rotation"),
@@ -32,18 +32,19 @@ ESTIMATE_DTYPE = dtype_of(ESTIMATE)
 _HEALTH = tuple(Health)  # an index into a tuple costs a tenth of a call of the enumeration
 
 
-@kernel
+@inlined
 def write_estimate(s, health, estimate):  # type: ignore[no-untyped-def]
-    """Copy the belief of the state record `s` into a record of ESTIMATE."""
+    """Copy the belief of the state record `s` into a record of ESTIMATE, all of it; no wind (see `write_wind`)."""
     estimate.health = health
     for i in range(3):
+        estimate.wind_e_m_s[i] = np.nan
         estimate.omega_b_rad_s[i] = s.omega_b_rad_s[i]
         estimate.gyro_bias_b_rad_s[i] = s.gyro_bias_b_rad_s[i]
         for j in range(3):
             estimate.R_eb[i, j] = s.R_eb[i, j]
 
 
-@kernel
+@inlined
 def write_wind(s, estimate):  # type: ignore[no-untyped-def]
     """Copy the wind that the state record `s` believes in into a record of ESTIMATE, where it is known."""
     if s.wind_known:
@@ -66,14 +67,14 @@ class Compiled:
         self._R_eb = self._state["R_eb"][0]
         self._omega_b_rad_s = self._state["omega_b_rad_s"][0]
         self._gyro_bias_b_rad_s = self._state["gyro_bias_b_rad_s"][0]
-        self._estimates_wind = "wind_known" in (state_dtype.names or ())
+        estimates_wind = "wind_known" in (state_dtype.names or ())
+        self._wind_known = self._state["wind_known"] if estimates_wind else np.zeros(1, np.int64)
+        self._wind_e_m_s = self._state["wind_e_m_s"][0] if estimates_wind else np.zeros(3)
 
     def update(self, m: Measurements) -> AttitudeEstimate:
         """Take one tick's measurements, return the attitude at its end; the arrays are the caller's to keep."""
         health = self._step(m.rows, m.k, self._state)
-        wind_e_m_s = None
-        if self._estimates_wind and self._state["wind_known"][0]:
-            wind_e_m_s = self._state["wind_e_m_s"][0].copy()
+        wind_e_m_s = self._wind_e_m_s.copy() if self._wind_known[0] else None
         return AttitudeEstimate(
             self._R_eb.copy(), self._omega_b_rad_s.copy(), self._gyro_bias_b_rad_s.copy(), wind_e_m_s, _HEALTH[health]
         )
@@ -89,8 +90,7 @@ class Compiled:
         -------
         shape (N,), ESTIMATE_DTYPE: R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health
         """
-        estimates = np.zeros(len(rows), ESTIMATE_DTYPE)
-        estimates["wind_e_m_s"] = np.nan
+        estimates = np.empty(len(rows), ESTIMATE_DTYPE)
         self._replay(rows, self._state, estimates)
         return estimates
 

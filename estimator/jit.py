@@ -58,11 +58,23 @@ def kernel(function: Callable[..., Any]) -> Any:
     Used as a plain decorator.  A kernel of the loop takes few, array-typed arguments and
     allocates nothing.
     """
+    return _compile(function)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A `kernel` that always becomes part of its caller: for the steps of an algorithm that runs at every tick.
+
+    Inside one function the compiler keeps the state in registers; a call makes it write and read all of it.
+    """
+    return _compile(function, forceinline=True)
+
+
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_dir())
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        return numba.njit(cache=True, error_model="numpy", **options)(function)
     except RuntimeError:  # no place to cache in (a function typed at a prompt, a read-only home)
-        return numba.njit(error_model="numpy")(function)
+        return numba.njit(error_model="numpy", **options)(function)
     finally:
         config.CACHE_DIR = before

@@ -14,24 +14,20 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009, sectio
 
 import numpy as np
 
-from estimator.jit import kernel
+from estimator.jit import inlined
 from estimator.kernels import clip
 
 
-@kernel
+@inlined
 def weigh(w_rp, roll_pitch_b, w_y, yaw_b, total_b):  # type: ignore[no-untyped-def]
     """Fill `total_b` with the weighted sum of the two corrections, all of shape (3,), body axes (Eqn 28)."""
     for i in range(3):
         total_b[i] = w_rp * roll_pitch_b[i] + w_y * yaw_b[i]
 
 
-@kernel
+@inlined
 def feed_back(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_p_b, omega_i_b):  # type: ignore[no-untyped-def]
-    """Update the proportional and the integral rate corrections, in place (Eqn 29).
-
-    In the steady state the proportional correction holds at most the offset that is still to be learnt.  A
-    correction larger than any believable offset is therefore something else (yaw lock, a turn in wind, a throw):
-    the integral sees no more of it than such an offset would cause.  This is all the anti-wind-up there is.
+    """Update the proportional and the integral rate corrections, in place (Eqn 29); see `learn_offset`.
 
     Parameters
     ----------
@@ -40,9 +36,28 @@ def feed_back(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_p_b, omega_i_b)
     offset_limit_rad_s : float       largest gyro offset that is believed, per axis
     omega_p_b, omega_i_b : shape (3,)  rate corrections, written
     """
-    size = k_p * np.sqrt(total_b[0] ** 2 + total_b[1] ** 2 + total_b[2] ** 2)
-    seen = 1.0 if size <= offset_limit_rad_s else offset_limit_rad_s / size
+    correct(total_b, k_p, omega_p_b)
+    learn_offset(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_i_b)
+
+
+@inlined
+def correct(total_b, k_p, omega_p_b):  # type: ignore[no-untyped-def]
+    """Set the proportional rate correction (Eqn 29, first line)."""
     for i in range(3):
         omega_p_b[i] = k_p * total_b[i]
-        integral = omega_i_b[i] + k_i * dt_s * seen * total_b[i]
-        omega_i_b[i] = clip(integral, -offset_limit_rad_s, offset_limit_rad_s)
+
+
+@inlined
+def learn_offset(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_i_b):  # type: ignore[no-untyped-def]
+    """Update the integral rate correction, in place (Eqn 29, second line).
+
+    In the steady state the proportional correction holds at most the offset that is still to be learnt.  A
+    correction larger than any believable offset is therefore something else (yaw lock, a turn in wind, a throw):
+    the integral sees no more of it than such an offset would cause.  This is all the anti-wind-up there is.
+    """
+    step_s = k_i * dt_s
+    squared = k_p * k_p * (total_b[0] * total_b[0] + total_b[1] * total_b[1] + total_b[2] * total_b[2])
+    if squared > offset_limit_rad_s * offset_limit_rad_s:
+        step_s *= offset_limit_rad_s / np.sqrt(squared)
+    for i in range(3):
+        omega_i_b[i] = clip(omega_i_b[i] + step_s * total_b[i], -offset_limit_rad_s, offset_limit_rad_s)

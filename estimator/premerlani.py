@@ -21,11 +21,9 @@ Beyond the paper
 ----------------
 Each but the yaw lock has a parameter that turns it off.
 
-*GPS-lag filter* (the paper names it, without equations).  The nose passes the receiver's own filter and latency
-before it meets the course.  Two things follow.  A vector filter also shrinks the speed of a turning aeroplane: it
-is divided by the length of the equally filtered nose.  And a filter inside the feedback loop delays the
-correction: so the filter runs on the motion the gyros felt alone, free of proportional yaw corrections, and all
-of these are applied to its output at once (`rotate_history`; the loop then has no lag, whatever the receiver's).
+*GPS-lag filter* (`estimator.gps_lag`; the paper names it, without equations).  The nose passes the receiver's own
+filter and latency before it meets the course.  A vector filter also shrinks the speed of a turning aeroplane: it is
+divided by the length of the equally filtered nose.  `rotate_history` takes the lag out of the feedback loop.
 
 *Yaw lock.*  The cross product of Eqn 23 fades beyond 90 degrees of error and vanishes at 180.  Beyond 90 its
 sign is kept and its size is one.
@@ -37,9 +35,18 @@ an integral that kept running would learn it as an offset of the pitch gyro.
 *Launch gate.*  While the length of ``g_reference`` is not that of gravity, forward acceleration or a wrong speed
 is in it: no roll-pitch correction then.
 
-*Speed of the turn* (off by default).  In wind the ground speed of Eqn 25 is not the speed through the air that
-turns the aeroplane.  But a turn about the vertical accelerates horizontally: the speed for which ``g_reference`` is
-at right angles to ``omega x V`` needs no GPS at all.  (MatrixPilot took to such a speed in 2017.)
+*Speed through the air.*  In wind the ground speed of Eqn 25 is not the speed that turns the aeroplane.  The best
+that there is takes its place: the airspeed sensor's where one reports; with `turn_speed` what level turns tell (a
+turn about the vertical accelerates horizontally: the speed for which ``g_reference`` is at right angles to
+``omega x V``; MatrixPilot took to such a speed in 2017); with `learn_wind` ground velocity less wind.
+
+*Wind* (off by default; the paper: "somehow compute the wind vector").  Learnt in turns, `estimator.wind`.  The
+reference of Eqn 22 is then the direction of ground velocity less wind, and the heading converges to the nose.
+
+*Saturation* (the paper: "error will be introduced into the roll-pitch orientation").  A clipped axis says no more
+than that it is clipped: what the estimate itself expects stands in for it, and only the other axes steer.
+
+*Yaw lock after the launch* (the paper: "a large weight"; off by default).  A larger weight until yaw is locked.
 
 References
 ----------
@@ -52,11 +59,20 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.compiled import BELIEF, Compiled, write_estimate
-from estimator.interface import Column, HeadingReference, ImuSample, dtype_of
-from estimator.jit import kernel
+from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.gps_lag import (
+    LAG,
+    LONGEST_LATENCY_S,
+    corrected_nose,
+    filter_nose,
+    recall_nose,
+    start_history,
+    turn_frame,
+)
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.jit import inlined, kernel
 from estimator.kernels import clip
-from estimator.pi import feed_back, weigh
+from estimator.pi import correct, learn_offset, weigh
 from estimator.rotation import integrate
 from estimator.screening import (
     FORCE_GOOD,
@@ -69,21 +85,23 @@ from estimator.screening import (
     screen,
     take_rate,
 )
+from estimator.wind import WIND_FILTER, learn_wind
 
-HISTORY, SPACING_S = 640, 0.0199  # remembered noses and their least distance in time: 12.7 s at any sample rate
-LONGEST_LATENCY_S = 12.5
 FIX_LIFE_S = 2.0  # an older fix corrects nothing any more
-LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this close for this long
+AIR_LIFE_S = 1.0  # nor does an older airspeed
+LOCK_TAN, LOCK_S = math.tan(math.radians(15.0)), 1.0  # yaw is locked once it was this close for this long
 TURN_RAD_S, TURN_S = 0.3, 3.0  # slowest turn that tells a speed, and how slowly it is believed
 SHORTEST_NOSE = 0.3  # a shorter filtered nose (a loop, a spin) restores no speed
+LEAST_CLIP_M_S2 = 1.5 * G_M_S2  # no accelerometer that flies ends below
 
 
 @dataclass(frozen=True, slots=True)
 class PremerlaniParams:
-    """Gains and options.
+    """Gains and options; `estimator.gains.recommended_gains` works gains out from a time of recovery.
 
     w_rp, w_y : float          weights of the roll-pitch and the yaw correction, Eqn 28.  Large: errors go quickly,
                                but accelerations and wind get in
+    w_y_until_lock : float     weight of the yaw correction until yaw is locked, where that is more than `w_y`
     k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
     offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
     integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
@@ -92,13 +110,20 @@ class PremerlaniParams:
     gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
     rotate_history : bool      take the receiver's lag out of the yaw loop
     launch_gate : float        no roll-pitch correction while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
-    turn_speed : bool          learn the speed of Eqn 25 in level turns; needed in wind
-    min_speed_m_s : float      slowest ground speed at which a course means anything
+    clip_m_s2 : float          an accelerometer axis that reads so much is clipped: a count less than its full scale;
+                               inf where that is not known
+    find_clip : bool           take the largest reading of an axis for its full scale once it comes a second time
+    airspeed : bool            use the airspeed of a sensor in Eqn 25 while there is one
+    turn_speed : bool          learn the speed of Eqn 25 in level turns; good in wind
+    learn_wind : bool          learn the wind in turns, for the reference of Eqn 22 and the speed of Eqn 25; the
+                               heading then converges to the nose.  Needs `rotate_history`
+    min_speed_m_s : float      slowest speed at which a course means anything
     gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
     """
 
     w_rp: float = 0.3
     w_y: float = 1.2
+    w_y_until_lock: float = 0.0
     k_p: float = 1.0
     k_i: float = 0.03
     offset_limit_rad_s: float = math.radians(6.0)
@@ -108,14 +133,19 @@ class PremerlaniParams:
     gps_latency_s: float = 0.3
     rotate_history: bool = True
     launch_gate: float = 0.2
+    clip_m_s2: float = math.inf
+    find_clip: bool = False
+    airspeed: bool = True
     turn_speed: bool = False
+    learn_wind: bool = False
     min_speed_m_s: float = 3.0
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S
     force_range_m_s2: float = FORCE_RANGE_M_S2
 
     def __post_init__(self) -> None:
         positive = (
-            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2",
+            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "clip_m_s2", "gyro_range_rad_s",
+            "force_range_m_s2",
         )  # fmt: skip
         for f in fields(self):
             value = getattr(self, f.name)
@@ -129,6 +159,12 @@ class PremerlaniParams:
                 raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
         if self.gps_latency_s > LONGEST_LATENCY_S:
             raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
+        if self.clip_m_s2 < LEAST_CLIP_M_S2:
+            raise ValueError(
+                f"clip_m_s2 is {self.clip_m_s2} m/s^2; gravity is felt, {LEAST_CLIP_M_S2:.1f} is the least"
+            )
+        if self.learn_wind and not self.rotate_history:
+            raise ValueError("learn_wind is on and rotate_history off; wind is learnt from a nose free of corrections")
 
 
 _PARAMS = tuple(
@@ -144,24 +180,24 @@ _STATE = (
     Column("roll_pitch_b", (3,), "roll-pitch correction, Eqn 27"),
     Column("yaw_b", (3,), "yaw correction, Eqn 24"),
     Column("total_b", (3,), "weighted sum, Eqn 28"),
+    Column("learning", (), "1 where the integral takes the total of this sample", integer=True),
     Column("g_ref_b_m_s2", (3,), "reference of gravity, Eqn 26"),
-    Column("speed_m_s", (), "speed of Eqn 25"),
+    Column("largest_b_m_s2", (3,), "largest reading of each accelerometer axis"),
+    Column("may_clip", (), "1 where the end of the scale is known or looked for", integer=True),
+    Column("clipped", (), "which axes are clipped: 1 x, 2 y, 4 z", integer=True),
+    Column("speed_m_s", (), "speed of Eqn 25 from the last fix"),
     Column("turn_speed_m_s", (), "the same learnt in turns, 0 until then"),
+    Column("airspeed_m_s", (), "the same from the last air-data sample"),
+    Column("air_age_s", (), "time since that"),
     Column("course", (2,), "COGX, COGY of the last fix, Eqn 22"),
     Column("fix_age_s", (), "time since a usable fix"),
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
-    Column("yaw_applied_rad", (), "sum of proportional yaw corrections, where the history is free of them"),
-    Column("nose", (2,), "filtered horizontal nose, in the frame of the history"),
-    Column("nose_at_fix", (2,), "the same, as old as the last fix"),
-    Column("history_t_s", (HISTORY,), "when each remembered nose was"),
-    Column("history", (HISTORY, 2), "remembered filtered noses"),
-    Column("newest", (), "index of the newest of them", integer=True),
 )
-STATE_DTYPE = dtype_of(BELIEF + SCREEN + _PARAMS + _STATE)
+STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + LAG + _PARAMS + _STATE)
 
 
-@kernel
+@inlined
 def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
     """The rate to integrate: gyro less offset and plus corrections (Eqn 16); ``s.omega_b_rad_s`` is it without P."""
     for i in range(3):
@@ -171,80 +207,85 @@ def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
         s.omega_total_b[i] = s.omega_b_rad_s[i] + s.omega_p_b[i]
 
 
-@kernel
-def filter_nose(s):  # type: ignore[no-untyped-def]
-    """Pass the horizontal nose through the receiver's filter and remember it: Paul's filter."""
-    # Seen in a frame that turns with the proportional yaw corrections, the nose knows the gyros alone.
-    c, z = np.cos(s.yaw_applied_rad), np.sin(s.yaw_applied_rad)
-    x = c * s.R_eb[0, 0] + z * s.R_eb[1, 0]
-    y = c * s.R_eb[1, 0] - z * s.R_eb[0, 0]
-    lagged = s.gps_lag_filter and s.gps_filter_s > 0.0
-    gain = 1.0 - np.exp(-s.dt_s / s.gps_filter_s) if lagged else 1.0
-    s.nose[0] += gain * (x - s.nose[0])
-    s.nose[1] += gain * (y - s.nose[1])
-    if s.clock_s - s.history_t_s[s.newest] >= SPACING_S:
-        s.newest = (s.newest + 1) % HISTORY
-        s.history_t_s[s.newest] = s.clock_s
-        s.history[s.newest, 0], s.history[s.newest, 1] = s.nose[0], s.nose[1]
+@inlined
+def take_air(row, s):  # type: ignore[no-untyped-def]
+    """Take the airspeed of an air-data sample that arrived."""
+    s.air_age_s += s.dt_s
+    if row.air_new and s.airspeed and 0.0 < row.airspeed_m_s < 1000.0:
+        s.airspeed_m_s = row.airspeed_m_s
+        s.air_age_s = 0.0
 
 
-@kernel
-def recall_nose(s, t_s):  # type: ignore[no-untyped-def]
-    """Set ``s.nose_at_fix`` to the filtered nose at `t_s`, between two remembered ones, or the oldest there is."""
-    t1, x1, y1 = s.clock_s, s.nose[0], s.nose[1]
-    for back in range(HISTORY):
-        i = (s.newest - back) % HISTORY
-        t0, x0, y0 = s.history_t_s[i], s.history[i, 0], s.history[i, 1]
-        if t0 > t1:  # came round to a newer one: the previous was the oldest
-            break
-        if t0 <= t_s:
-            part = (t_s - t0) / (t1 - t0) if t1 > t0 else 1.0
-            x1, y1 = x0 + part * (x1 - x0), y0 + part * (y1 - y0)
-            break
-        t1, x1, y1 = t0, x0, y0
-    s.nose_at_fix[0], s.nose_at_fix[1] = x1, y1
-
-
-@kernel
+@inlined
 def take_fix(row, s):  # type: ignore[no-untyped-def]
-    """Take course (Eqn 22) and speed of a fix that arrived, and the nose that belongs to it."""
+    """Take a fix that arrived, if it is one."""
     s.fix_age_s += s.dt_s
-    if not row.gps_new:
-        return
-    course, speed = row.gps_course_rad, row.gps_speed_m_s
-    if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0):
-        s.rejected += 1
-        return
-    recall_nose(s, s.clock_s - s.gps_latency_s if s.gps_lag_filter else s.clock_s)
+    if row.gps_new:
+        if abs(row.gps_course_rad) < 100.0 and 0.0 <= row.gps_speed_m_s < 1000.0:
+            believe_fix(row.gps_course_rad, row.gps_speed_m_s, s)
+        else:
+            s.rejected += 1
+
+
+@inlined
+def nose_length(s):  # type: ignore[no-untyped-def]
+    """Length of the horizontal nose that belongs to the last fix."""
+    return np.sqrt(s.nose_at_fix[0] * s.nose_at_fix[0] + s.nose_at_fix[1] * s.nose_at_fix[1])
+
+
+@kernel
+def believe_fix(course_rad, speed_m_s, s):  # type: ignore[no-untyped-def]
+    """Set the reference (Eqn 22) and the speed of Eqn 25, and recall the nose that belongs to them."""
+    recall_nose(s)
+    north, east = speed_m_s * np.cos(course_rad), speed_m_s * np.sin(course_rad)
+    if s.learn_wind:
+        if speed_m_s >= s.min_speed_m_s:
+            learn_wind(s, s.nose_at_fix[0], s.nose_at_fix[1], north, east, s.fix_age_s)
+        if s.wind_known:
+            north, east = north - s.wind_e_m_s[0], east - s.wind_e_m_s[1]
+    speed = np.sqrt(north * north + east * east)
     s.speed_m_s = speed
     if s.gps_lag_filter:  # the filter that shortened the nose shortened the velocity alike
-        s.speed_m_s /= clip(np.hypot(s.nose_at_fix[0], s.nose_at_fix[1]), SHORTEST_NOSE, 1.0)
+        s.speed_m_s /= clip(nose_length(s), SHORTEST_NOSE, 1.0)
     if speed >= s.min_speed_m_s:
         s.fix_age_s = 0.0
-        s.course[0], s.course[1] = np.cos(course), np.sin(course)  # Eqn 22
+        s.course[0], s.course[1] = north / speed, east / speed  # Eqn 22
 
 
-@kernel
+@inlined
 def yaw_correction(s):  # type: ignore[no-untyped-def]
-    """Fill ``s.yaw_b`` (Eqns 23 and 24); zero without a fresh fix."""
+    """Fill ``s.yaw_b`` (Eqns 23 and 24), zero without a fresh fix; returns its weight."""
     ground = 0.0
     if s.fix_age_s <= FIX_LIFE_S:
-        # The nose of the fix, with all corrections since applied to it.
-        c, z = np.cos(s.yaw_applied_rad), np.sin(s.yaw_applied_rad)
-        x = c * s.nose_at_fix[0] - z * s.nose_at_fix[1]
-        y = z * s.nose_at_fix[0] + c * s.nose_at_fix[1]
+        x, y = corrected_nose(s)
         ground = x * s.course[1] - y * s.course[0]  # Eqn 23
         along = x * s.course[0] + y * s.course[1]
-        near = along > 0.0 and abs(ground) < np.tan(LOCK_RAD) * along
-        s.near_s = s.near_s + s.dt_s if near else 0.0
+        s.near_s = s.near_s + s.dt_s if abs(ground) < LOCK_TAN * along else 0.0
         if s.near_s >= LOCK_S:
             s.locked = 1
         if along < 0.0:  # more than a right angle off: full strength
-            ground = np.copysign(np.hypot(x, y), ground)
+            ground = np.copysign(np.sqrt(x * x + y * y), ground)
+    weight = s.w_y if s.locked else max(s.w_y, s.w_y_until_lock)
     for i in range(3):
         s.yaw_b[i] = ground * s.R_eb[2, i]  # Eqn 24
     if s.rotate_history:
-        s.yaw_applied_rad += s.k_p * s.w_y * ground * s.dt_s
+        turn_frame(s, s.k_p * weight * ground * s.dt_s)
+    return weight
+
+
+@inlined
+def find_clipped(f, s):  # type: ignore[no-untyped-def]
+    """Set ``s.clipped``: axes at the end of the scale, given or found."""
+    s.clipped = 0
+    for i in range(3):
+        size = abs(f[i])
+        if size >= s.clip_m_s2:
+            s.clipped |= 1 << i
+        if s.find_clip and size >= s.largest_b_m_s2[i]:
+            # Readings that are no end of the scale do not come twice to the last digit, except at rest.
+            if size == s.largest_b_m_s2[i] and size > LEAST_CLIP_M_S2:
+                s.clipped |= 1 << i
+            s.largest_b_m_s2[i] = size
 
 
 @kernel
@@ -262,27 +303,43 @@ def learn_turn_speed(f, s):  # type: ignore[no-untyped-def]
     s.turn_speed_m_s += (1.0 - np.exp(-s.dt_s / TURN_S)) * (felt - s.turn_speed_m_s)
 
 
-@kernel
+@inlined
+def speed_through_air(f, s):  # type: ignore[no-untyped-def]
+    """The speed of Eqn 25: a sensor's, else the one learnt in turns, else that of the last fix."""
+    if s.air_age_s <= AIR_LIFE_S:
+        return s.airspeed_m_s
+    if s.turn_speed:
+        if not s.clipped:
+            learn_turn_speed(f, s)
+        if s.turn_speed_m_s > 0.0:
+            return s.turn_speed_m_s
+    return s.speed_m_s
+
+
+@inlined
 def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
     """Fill ``s.roll_pitch_b`` (Eqns 25 to 27, the last with its sign put right); zero outside the launch gate."""
-    f, w, v, g = row.force_b_m_s2, s.omega_b_rad_s, s.speed_m_s, s.g_ref_b_m_s2
-    if s.turn_speed:
-        learn_turn_speed(f, s)
-        v = s.turn_speed_m_s if s.turn_speed_m_s > 0.0 else v
+    f, w, g = row.force_b_m_s2, s.omega_b_rad_s, s.g_ref_b_m_s2
+    if s.may_clip:
+        find_clipped(f, s)
+    v = speed_through_air(f, s)
     # The paper's accelerometer is gravity minus acceleration, which is -f.  Eqn 25: omega x (v, 0, 0).
     g[0] = -f[0]  # Eqn 26
     g[1] = -f[1] + w[2] * v
     g[2] = -f[2] - w[1] * v
+    x, y, z = s.R_eb[2, 0], s.R_eb[2, 1], s.R_eb[2, 2]
+    if s.clipped:
+        for i in range(3):
+            g[i] = G_M_S2 * s.R_eb[2, i] if s.clipped & (1 << i) else g[i]
     length = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
     believed = length > 0.0 and abs(length / G_M_S2 - 1.0) <= s.launch_gate
     scale = 1.0 / length if believed else 0.0
-    x, y, z = s.R_eb[2, 0], s.R_eb[2, 1], s.R_eb[2, 2]
     s.roll_pitch_b[0] = scale * (g[1] * z - g[2] * y)  # Eqn 27, corrected: reference x estimate
     s.roll_pitch_b[1] = scale * (g[2] * x - g[0] * z)
     s.roll_pitch_b[2] = scale * (g[0] * y - g[1] * x)
 
 
-@kernel
+@inlined
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One pass of the algorithm over row `k`.
 
@@ -301,20 +358,22 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     good = screen(row, s)
     if good:
         corrected_rate(row, s, good)
+        if s.learning:  # from the sample before: the processor need not wait for it, and it changes slowly
+            learn_offset(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_i_b)
         if not integrate(s.R_eb, s.omega_total_b, s.dt_s):  # Eqns 17-21
             s.locked = 0
         filter_nose(s)
+        take_air(row, s)
         take_fix(row, s)
-        yaw_correction(s)
+        w_y = yaw_correction(s)
         if good & FORCE_GOOD:
             roll_pitch_correction(row, s)
         else:
             s.roll_pitch_b[0] = s.roll_pitch_b[1] = s.roll_pitch_b[2] = 0.0
-        weigh(s.w_rp, s.roll_pitch_b, s.w_y, s.yaw_b, s.total_b)
+        weigh(s.w_rp, s.roll_pitch_b, w_y, s.yaw_b, s.total_b)
+        correct(s.total_b, s.k_p, s.omega_p_b)
         w = s.omega_b_rad_s
-        turning = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) >= s.integrate_below_rad_s
-        k_i = 0.0 if turning else s.k_i
-        feed_back(s.total_b, s.k_p, k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
+        s.learning = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < s.integrate_below_rad_s * s.integrate_below_rad_s
     if s.rejected != before:
         return 2  # Health.POOR
     if not s.locked:
@@ -327,6 +386,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
         health = step(rows, k, state)
         write_estimate(state[0], health, estimates[k])
+        write_wind(state[0], estimates[k])
 
 
 class Premerlani(Compiled):
@@ -337,13 +397,16 @@ class Premerlani(Compiled):
     params : gains and options; the defaults suit a model aeroplane with a 1 s, 0.3 s late GPS
     """
 
-    heading_reference: HeadingReference = "course"
+    heading_reference: HeadingReference = "course"  # "nose" with `learn_wind`
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "airspeed")
     _step: ClassVar[Any] = staticmethod(step)
     _replay: ClassVar[Any] = staticmethod(_replay)
 
     def __init__(self, params: PremerlaniParams | None = None) -> None:
         super().__init__(STATE_DTYPE)
         self.params = params or PremerlaniParams()
+        if self.params.learn_wind:
+            self.heading_reference = "nose"
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:
@@ -358,5 +421,6 @@ class Premerlani(Compiled):
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
-        s["fix_age_s"] = math.inf
-        s["nose"] = s["nose_at_fix"] = s["history"] = s["R_eb"][:2, 0]
+        s["may_clip"] = self.params.find_clip or math.isfinite(self.params.clip_m_s2)
+        s["fix_age_s"] = s["air_age_s"] = math.inf
+        start_history(s)

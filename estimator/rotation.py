@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator.interface import Array
-from estimator.jit import kernel
+from estimator.jit import inlined, kernel
 from estimator.kernels import wrap
 
 NEAR = 0.02  # within this of a unit length (squared) or of a right angle (cosine), Eqns 19 and 21 are good to 3e-4
@@ -20,7 +20,7 @@ LONGEST_STEP_RAD = 0.2  # Eqn 17 wants steps that change little
 HOPELESS = 1e-6  # rows this short, or this parallel, no longer say where an axis points
 
 
-@kernel
+@inlined
 def propagate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
     """Rotate the attitude by one gyro sample, in place (Eqn 17).
 
@@ -38,26 +38,35 @@ def propagate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
         R_eb[i, 2] = c + a * y - b * x
 
 
-@kernel
-def _row_dot(R, i, j):  # type: ignore[no-untyped-def]
-    return R[i, 0] * R[j, 0] + R[i, 1] * R[j, 1] + R[i, 2] * R[j, 2]
+@inlined
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
-def _z_from_x_y(R):  # type: ignore[no-untyped-def]
-    """Set the Z row to the cross product of the X and Y rows (Eqn 20)."""
-    R[2, 0] = R[0, 1] * R[1, 2] - R[0, 2] * R[1, 1]
-    R[2, 1] = R[0, 2] * R[1, 0] - R[0, 0] * R[1, 2]
-    R[2, 2] = R[0, 0] * R[1, 1] - R[0, 1] * R[1, 0]
+@inlined
+def _cross(a, b):  # type: ignore[no-untyped-def]
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel
-def _scale_row(R, i, factor):  # type: ignore[no-untyped-def]
-    for j in range(3):
-        R[i, j] *= factor
+@inlined
+def _less(a, factor, b):  # type: ignore[no-untyped-def]
+    """``a - factor b``."""
+    return a[0] - factor * b[0], a[1] - factor * b[1], a[2] - factor * b[2]
 
 
-@kernel
+@inlined
+def _set_row(R, i, row, scale):  # type: ignore[no-untyped-def]
+    R[i, 0], R[i, 1], R[i, 2] = scale * row[0], scale * row[1], scale * row[2]
+
+
+@inlined
+def _to_unit(row):  # type: ignore[no-untyped-def]
+    """What a row is to be multiplied by for unit length: Eqn 21 near it, the reciprocal of its length elsewhere."""
+    squared = _dot(row, row)
+    return 0.5 * (3.0 - squared) if abs(squared - 1.0) < NEAR else 1.0 / np.sqrt(squared)
+
+
+@inlined
 def renormalise(R_eb):  # type: ignore[no-untyped-def]
     """Bring the matrix back to a rotation, in place (Eqns 18-21).
 
@@ -77,29 +86,30 @@ def renormalise(R_eb):  # type: ignore[no-untyped-def]
     bool    False where nothing can be saved (not finite, or X and Y rows vanishing or parallel); the matrix is
             then left as it was, and the caller restarts from an attitude it trusts
     """
-    xx, yy, error = _row_dot(R_eb, 0, 0), _row_dot(R_eb, 1, 1), _row_dot(R_eb, 0, 1)  # Eqn 18
-    if abs(xx - 1.0) < NEAR and abs(yy - 1.0) < NEAR and abs(error) < NEAR:
-        for j in range(3):
-            x, y = R_eb[0, j], R_eb[1, j]
-            R_eb[0, j] = x - 0.5 * error * y  # Eqn 19
-            R_eb[1, j] = y - 0.5 * error * x
-        _z_from_x_y(R_eb)  # Eqn 20
-        for i in range(3):
-            squared = _row_dot(R_eb, i, i)
-            near = abs(squared - 1.0) < NEAR
-            _scale_row(R_eb, i, 0.5 * (3.0 - squared) if near else 1.0 / np.sqrt(squared))  # Eqn 21
-        return True
+    x, y = (R_eb[0, 0], R_eb[0, 1], R_eb[0, 2]), (R_eb[1, 0], R_eb[1, 1], R_eb[1, 2])
+    xx, yy, error = _dot(x, x), _dot(y, y), _dot(x, y)  # Eqn 18
+    if not (abs(xx - 1.0) < NEAR and abs(yy - 1.0) < NEAR and abs(error) < NEAR):
+        return _orthogonalise(R_eb, xx, yy, error)
+    x, y = _less(x, 0.5 * error, y), _less(y, 0.5 * error, x)  # Eqn 19
+    z = _cross(x, y)  # Eqn 20
+    _set_row(R_eb, 0, x, _to_unit(x))  # Eqn 21
+    _set_row(R_eb, 1, y, _to_unit(y))
+    _set_row(R_eb, 2, z, _to_unit(z))
+    return True
+
+
+@kernel
+def _orthogonalise(R_eb, xx, yy, error):  # type: ignore[no-untyped-def]
+    """Gram-Schmidt on the X and Y rows, whose dot products are given; answers as `renormalise` does."""
     # Written so that NaN is hopeless too; 1 - cosine^2 is the squared sine between the two rows.
     if not (HOPELESS < xx < 1.0 / HOPELESS and HOPELESS < yy < 1.0 / HOPELESS):
         return False
     if not 1.0 - error * error / (xx * yy) > HOPELESS:
         return False
-    _scale_row(R_eb, 0, 1.0 / np.sqrt(xx))
-    error = _row_dot(R_eb, 0, 1)
-    for j in range(3):
-        R_eb[1, j] -= error * R_eb[0, j]
-    _scale_row(R_eb, 1, 1.0 / np.sqrt(_row_dot(R_eb, 1, 1)))
-    _z_from_x_y(R_eb)
+    _set_row(R_eb, 0, R_eb[0], 1.0 / np.sqrt(xx))
+    y = _less(R_eb[1], _dot(R_eb[0], R_eb[1]), R_eb[0])
+    _set_row(R_eb, 1, y, 1.0 / np.sqrt(_dot(y, y)))
+    _set_row(R_eb, 2, _cross(R_eb[0], R_eb[1]), 1.0)
     return True
 
 
@@ -111,14 +121,24 @@ def level(R_eb):  # type: ignore[no-untyped-def]
             R_eb[i, j] = 1.0 if i == j else 0.0
 
 
-@kernel
+@inlined
 def integrate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
     """Propagate and renormalise, in place, in as many parts as Eqn 17 needs (one, up to 0.2 rad in a sample).
 
     Never leaves the rotations: a matrix that cannot be saved becomes level, and the answer is then False.
     """
-    x, y, z = omega_b_rad_s[0], omega_b_rad_s[1], omega_b_rad_s[2]
-    angle_rad = dt_s * np.sqrt(x * x + y * y + z * z)
+    angle_squared = dt_s * dt_s * _dot(omega_b_rad_s, omega_b_rad_s)
+    if angle_squared > LONGEST_STEP_RAD**2:
+        return _integrate_in_parts(R_eb, omega_b_rad_s, dt_s, np.sqrt(angle_squared))
+    propagate(R_eb, omega_b_rad_s, dt_s)
+    if renormalise(R_eb):
+        return True
+    level(R_eb)
+    return False
+
+
+@kernel
+def _integrate_in_parts(R_eb, omega_b_rad_s, dt_s, angle_rad):  # type: ignore[no-untyped-def]
     parts = 1 + int(min(angle_rad / LONGEST_STEP_RAD, 1000.0))
     for _ in range(parts):
         propagate(R_eb, omega_b_rad_s, dt_s / parts)

@@ -38,7 +38,7 @@ class Kinematics:
 
 
 class Motion(Protocol):
-    """A closed form of a body's motion from `t_s` = 0 on."""
+    """A closed form of a body's motion from `t_s` = 0 on; ``rotor_rpm``, if it has one, is the speed of its rotors."""
 
     phase: ClassVar[Phase]
 
@@ -323,6 +323,7 @@ def motion_rows(motion: Motion, n_ticks: int, dt_s: float, latitude_rad: float) 
     rows["alpha_rad"] = np.arctan2(w, u)
     rows["beta_rad"] = np.arcsin(np.divide(v, airspeed, out=np.zeros(n_ticks), where=airspeed > 0.0))
     rows["phase"] = motion.phase
+    rows["rotor_rpm"] = getattr(motion, "rotor_rpm", 0.0)
     return rows
 
 

@@ -36,6 +36,7 @@ from scenarios.harness.cli_options import (
     ShearOption,
     ThermalsOption,
     TurbulenceOption,
+    UnitOption,
     WebOption,
     WindOption,
     WorkersOption,
@@ -259,6 +260,7 @@ def replay(
     ] = "premerlani",
     reference: ReferenceOption = None,
     columns: ColumnsOption = None,
+    imu: UnitOption = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
     ] = None,
@@ -281,6 +283,7 @@ def replay(
                 out,
                 reference=reference,
                 columns=columns,
+                imu=imu,
                 params=_changes(set_),
                 window=Window(airborne, settle, calibration),
                 rerun=not no_rerun,

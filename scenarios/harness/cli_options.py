@@ -72,3 +72,7 @@ ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column m
 ReferenceOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
 ]
+UnitOption = Annotated[
+    int | None,
+    typer.Option("--imu", min=0, metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0."),
+]

@@ -61,6 +61,7 @@ def run(
     *,
     reference: Path | None = None,
     columns: str | None = None,
+    imu: int | None = None,
     params: Mapping[str, Any] | None = None,
     window: Window | None = None,
     rerun: bool = True,
@@ -80,7 +81,7 @@ def run(
     for name in names:
         make(name, of_each[name])
     recording.check_writable(into)
-    log = logs.read(path, reference=reference, columns=columns)
+    log = logs.read(path, reference=reference, columns=columns, imu=imu)
     console.warn_if_cold()
     replays, folders = [], {}
     for name in names:

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
 from sim.clock import Rates
+from sim.hover import Hover
 from sim.log import Log
 from sim.place import LATITUDE_DEG
 from sim.prescribed_plant import (
@@ -34,6 +35,7 @@ MOTIONS = {
     "straight_level": StraightLevel(0.7, wind_e_m_s=WIND, surge_m_s2=2.0),
     "steady_turn": SteadyTurn(math.radians(35.0), heading_rad=1.0, wind_e_m_s=WIND),
     "loop": Loop(heading_rad=-2.0, wind_e_m_s=WIND),
+    "hover": Hover(1.0),
     "turn_table": TurnTable(0.3, circle_s=2.0, quarter_s=1.2),
 }
 moving = pytest.mark.parametrize("motion", MOTIONS.values(), ids=MOTIONS.keys())

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator import premerlani
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample
+from estimator.pi import feed_back
 from estimator.premerlani import Premerlani, PremerlaniParams
 from estimator.rotation import heading_rad, inclination_error_rad
 
@@ -61,7 +62,7 @@ def fly_eqn_27(rows, state, sign):
         premerlani.roll_pitch_correction(rows[k], s)
         for i in range(3):
             s.total_b[i] = sign * s.w_rp * s.roll_pitch_b[i]
-        premerlani.feed_back(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
+        feed_back(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
 
 
 @pytest.mark.parametrize(("sign", "least_deg", "most_deg"), [(1.0, 0.0, 1.0), (-1.0, 170.0, 180.0)])

@@ -14,6 +14,7 @@ from estimator.screening import CLOCK_BACK_S, COAST_S
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 SANE = st.floats(-40.0, 40.0)
 NUMBER = st.one_of(SANE, SANE, SANE, ANY)
+SWITCHES = ("gps_lag_filter", "rotate_history", "find_clip", "airspeed", "turn_speed", "learn_wind")
 ROW = st.fixed_dictionaries(
     {
         "step_s": st.one_of(st.just(0.02), st.floats(-2.0, 2.0), ANY),  # of the clock since the row before
@@ -23,6 +24,8 @@ ROW = st.fixed_dictionaries(
         "gps_new": st.integers(0, 1),
         "gps_course_rad": NUMBER,
         "gps_speed_m_s": NUMBER,
+        "air_new": st.integers(0, 1),
+        "airspeed_m_s": NUMBER,
     }
 )
 
@@ -50,6 +53,7 @@ def flight(n, seed=0, gps=True):
     if gps:
         rows["gps_new"][::10] = 1
         rows["gps_course_rad"], rows["gps_speed_m_s"] = rng.uniform(0.0, 6.28, n), rng.uniform(2.0, 15.0, n)
+        rows["air_new"][::25], rows["airspeed_m_s"] = 1, rng.uniform(8.0, 15.0, n)
     return rows
 
 
@@ -62,14 +66,15 @@ def assert_rotations(R):
 @settings(max_examples=300, deadline=None)
 @given(
     st.lists(ROW, min_size=1, max_size=60),
-    st.booleans(),
-    st.booleans(),
-    st.booleans(),
+    st.fixed_dictionaries({name: st.booleans() for name in SWITCHES}),
     st.sampled_from([0.3, math.inf]),
+    st.sampled_from([20.0, math.inf]),
+    st.sampled_from([0.0, 5.0]),
 )
-def test_replay_whatever_comes_stays_a_finite_rotation(drawn, lag_filter, rotate, turn_speed, gate):
+def test_replay_whatever_comes_stays_a_finite_rotation(drawn, switches, gate, clip, w_y_until_lock):
     """Any numbers, NaN and inf too, any clock, any gaps in the GPS: never raises, never leaves SO(3)."""
-    params = PremerlaniParams(gps_lag_filter=lag_filter, rotate_history=rotate, turn_speed=turn_speed, launch_gate=gate)
+    switches["learn_wind"] &= switches["rotate_history"]
+    params = PremerlaniParams(**switches, launch_gate=gate, clip_m_s2=clip, w_y_until_lock=w_y_until_lock)
     estimates = Premerlani(params).replay(rows_of(drawn))
     assert_rotations(estimates["R_eb"])
     assert np.all(np.isfinite(estimates["omega_b_rad_s"]))
@@ -175,7 +180,16 @@ def test_clock_set_back_costs_one_sample():
     assert estimator.rejected == 1
 
 
-@pytest.mark.parametrize("params", [PremerlaniParams(), PremerlaniParams(gps_lag_filter=False, turn_speed=True)])
+UNKNOWN = np.full(3, np.nan)
+ALL_KINDS = [
+    PremerlaniParams(),
+    PremerlaniParams(gps_lag_filter=False, turn_speed=True),
+    PremerlaniParams(learn_wind=True, find_clip=True, w_y_until_lock=3.0),
+    PremerlaniParams(rotate_history=False, airspeed=False, clip_m_s2=20.0, launch_gate=math.inf),
+]
+
+
+@pytest.mark.parametrize("params", ALL_KINDS)
 def test_replay_equals_streaming_bit_for_bit(params):
     """One call over the log, or `update` row by row: the same bits in every column."""
     rows = flight(2000)
@@ -190,6 +204,7 @@ def test_replay_equals_streaming_bit_for_bit(params):
         np.testing.assert_array_equal(estimate.omega_b_rad_s, e["omega_b_rad_s"])
         np.testing.assert_array_equal(estimate.gyro_bias_b_rad_s, e["gyro_bias_b_rad_s"])
         assert estimate.health == e["health"]
+        np.testing.assert_array_equal(UNKNOWN if estimate.wind_e_m_s is None else estimate.wind_e_m_s, e["wind_e_m_s"])
     assert batch.snapshot().tobytes() == stream.snapshot().tobytes()
 
 

@@ -15,14 +15,16 @@ _BY_MAP = {  # columns of numbers, which a column map explains
     **dict.fromkeys((".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz"), "text"),
     ".mat": "matlab",
 }
-_OF_THEMSELVES = {".parquet": "ours", ".bin": "dataflash", ".ulg": "ulog"}  # formats that say what they hold
+_OF_AUTOPILOTS = {".bin": "dataflash", ".ulg": "ulog"}  # messages that say what they hold, of several inertial units
 KINDS = (
     "a folder or .parquet is a recording of ours, *_in.csv.gz reference vectors, .csv .txt .tsv (.gz) and .mat hold "
     "columns, .bin is ArduPilot's, .ulg PX4's"
 )
 
 
-def read(path: Path, *, reference: Path | None = None, columns: str | None = None) -> RecordedLog:
+def read(
+    path: Path, *, reference: Path | None = None, columns: str | None = None, imu: int | None = None
+) -> RecordedLog:
     """The log at `path`, put in order and checked, by the reader that its name asks for.
 
     Parameters
@@ -30,6 +32,7 @@ def read(path: Path, *, reference: Path | None = None, columns: str | None = Non
     reference : attitudes to score against, in a file of their own; for reference vectors one of the same set, for
                 others a text file with times on the same clock
     columns : column map of a text or MATLAB file, see `column_map`
+    imu : which inertial unit of an autopilot's log, from 0; unless told the one that the reader takes for the first
 
     Raises
     ------
@@ -39,7 +42,7 @@ def read(path: Path, *, reference: Path | None = None, columns: str | None = Non
         raise LogError(f"no log at {path}: there is no such file")
     if columns is None and vectors.is_reference(path):
         return checks.mended(vectors.read(path, reference), path)
-    log = _read(path, None if columns is None else column_map.load(columns))
+    log = _read(path, None if columns is None else column_map.load(columns), imu)
     if reference is not None:
         from scenarios.harness.logs import tabular, text
 
@@ -50,14 +53,22 @@ def read(path: Path, *, reference: Path | None = None, columns: str | None = Non
     return log
 
 
-def _read(path: Path, meanings: column_map.ColumnMap | None) -> RecordedLog:
+def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) -> RecordedLog:
     name = path.name.lower()
-    for ending, module in _BY_MAP.items():
-        if name.endswith(ending):
-            return import_module(f"{__name__}.{module}").read(path, meanings)
-    if meanings is not None:
+    by_map, autopilot = (_module(name, endings) for endings in (_BY_MAP, _OF_AUTOPILOTS))
+    if meanings is not None and not by_map:
         raise LogError(f"{path}: a column map is for text and MATLAB files")
-    for ending, module in {**_OF_THEMSELVES, **({name: "ours"} if path.is_dir() else {})}.items():
-        if name.endswith(ending):
-            return checks.mended(import_module(f"{__name__}.{module}").read(path), path)
+    if imu is not None and not autopilot:
+        raise LogError(f"{path}: an inertial unit is chosen in logs of autopilots (.bin, .ulg)")
+    if by_map:
+        return import_module(f"{__name__}.{by_map}").read(path, meanings)
+    if autopilot:
+        return import_module(f"{__name__}.{autopilot}").read(path, imu)
+    if path.is_dir() or name.endswith(".parquet"):
+        return checks.mended(import_module(f"{__name__}.ours").read(path), path)
     raise LogError(f"{path}: unknown kind of log; {KINDS}")
+
+
+def _module(name: str, endings: dict[str, str]) -> str:
+    """The reader of a file of that name, empty where none of the endings is its."""
+    return next((module for ending, module in endings.items() if name.endswith(ending)), "")

@@ -1,0 +1,342 @@
+"""The multi-rotor estimator of Dilshad and Jahan (2014): the DCM of Premerlani and Bizard with a magnetometer for yaw.
+
+Gyros steer (Premerlani's Eqns 16-21); the accelerometer as it is, without a centrifugal term, corrects roll and pitch;
+every 125 ms the tilt-compensated magnetometer (Eqns 5-7) says how far the yaw of the gyros has drifted; and over a long
+time the course from three GPS positions (Eqn 9) corrects what the magnetometer says, declination and leftover iron.
+All errors go through one PI controller (Premerlani's Eqns 28-29).  Iron: `estimator.magnetometer` (Eqn 8).
+
+The tilt of Eqns 5 and 6 is the accelerometer's.  That is right for a craft that stands or hovers in the mean.  In a
+coordinated turn the accelerometer feels no bank at all: the vertical part of the field then passes for a horizontal
+one, and in the north of America, where it is two and a half times the horizontal, the heading is off by more than the
+bank.  It is what pilots of compasses know as the northerly turning error: banked to the right on a northerly heading,
+the compass shows a turn to the left, and an autopilot that steers by it banks further.  In straight flight in a
+crosswind (the scenario, calibrated sensors, seeds 0-2) the heading error is 82 degrees with this tilt and 9 with the
+matrix's.  And the course is a heading only for what flies along its nose, an aeroplane in still air.  Neither is
+mended here: it is the paper's estimator, and one for multi-rotors.
+
+Axes
+----
+The paper turns both frames by 180 degrees about forward: body forward-left-up, earth north-west-up, so that its matrix
+is D R_eb D with D = diag(1, -1, -1).  The update of the matrix is the same in either.  The paper's axes are entered in
+`heading_of_field` and in `paper_angles`, and left there.
+
+Errata
+------
+*Eqn 4.*  With R = R_x(phi) R_z(-psi) R_y(-theta), of Eqns 1 to 3, three elements have wrong signs in print: the second
+terms of R_yx and R_zz, and the first of R_zx.  At zero angles the printed matrix is singular.  (The names R_y(theta_y)
+in Eqn 2 and R_z(theta_z) in Eqn 3 are interchanged.)  Eqns 10 to 12 follow from the right one; their ``tan^-2`` is the
+arctangent of two arguments.  Yaw is the middle angle: roll and pitch are lost at east and west, and no yaw is beyond.
+
+*Eqns 5 and 6* turn by the angle about the y axis, right-handed; the paper's pitch (nose up, Eqn 11) is its negative.
+And roll and pitch must be angles in that order, roll first: with those of the usual order (``roll = arctan(y / z)``)
+the heading of a body that is both rolled and pitched is wrong.  With roll first, Eqn 7 is the heading square to the
+wings, off the nose's by about roll times pitch: it is compared with that of the estimate, not with its nose.
+
+*Eqns 7 and 9.*  ``arctan(Y / X)`` takes south for north; read the arctangent of two arguments.
+
+*"The gyro readings have been normalized before calculating the kinematics"* (section f).  A normalised rate is 1 rad/s
+whatever the gyro says.  It is the matrix that is normalised.
+
+Beyond the paper
+----------------
+The paper gives no gains.  "Reporting latency and filtering have been taken into account", it says of the GPS: here by
+adding to the course what the nose has turned since, through one lag.  In turns no course is used: Eqn 7 is wrong there.
+
+References
+----------
+N. A. Dilshad and M. K. Jahan, "An Improvement Strategy on Direction Cosine Matrix based Attitude Estimation for
+Multi-Rotor Autopilot", Global Journal of Researches in Engineering F 14(8), 2014.
+W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
+"""
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimator.compiled import BELIEF, Compiled, write_estimate
+from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.jit import kernel
+from estimator.kernels import wrap
+from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
+from estimator.pi import feed_back, weigh
+from estimator.rotation import integrate
+from estimator.screening import (
+    FORCE_GOOD,
+    FORCE_RANGE_M_S2,
+    GYRO_RANGE_RAD_S,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    screen,
+    take_rate,
+)
+
+HEADING_LIFE_S = 1.0  # a magnetometer silent for longer corrects nothing any more
+STRAIGHT_RAD = math.radians(10.0)  # a nose that has turned further than this since the course was true is in a turn
+LONGEST_STEP_S, FASTEST_M_S = 2.5, 300.0  # between two positions that tell a velocity
+
+
+@dataclass(frozen=True, slots=True)
+class DilshadParams:
+    """Gains, and what the sensors are.
+
+    w_rp, w_y : float          weights of the roll-pitch and the yaw correction.  Large: errors go quickly, but
+                               accelerations and the field's disturbances get in
+    k_p, k_i : float           gains, 1/s and 1/s^2.  k_i / k_p is how fast a gyro offset is learnt
+    offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
+    yaw_every_s : float        shortest mean time between two magnetometer headings; the paper's 125 ms
+    calibration                of the magnetometer
+    declination_rad : float    of magnetic from true north, positive east; the GPS finds what is missing
+    gps_weight_s : float       time over which courses correct the magnetometer; inf: they do not
+    gps_lag_s : float          age of a course from three positions: filter, latency and one interval
+    min_speed_m_s : float      slowest ground speed, the receiver's, at which a course means anything
+    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
+    """
+
+    w_rp: float = 0.3
+    w_y: float = 0.6
+    k_p: float = 1.0
+    k_i: float = 0.02
+    offset_limit_rad_s: float = math.radians(6.0)
+    yaw_every_s: float = 0.125
+    calibration: Calibration = field(default_factory=Calibration)
+    declination_rad: float = 0.0
+    gps_weight_s: float = 20.0
+    gps_lag_s: float = 1.4
+    min_speed_m_s: float = 3.0
+    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
+    force_range_m_s2: float = FORCE_RANGE_M_S2
+    field_range_ut: float = FIELD_RANGE_UT
+
+    def __post_init__(self) -> None:
+        for name in ("w_rp", "w_y", "k_p", "k_i", "yaw_every_s", "min_speed_m_s"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, zero or more")
+        for name in ("offset_limit_rad_s", "gps_lag_s", "gyro_range_rad_s", "force_range_m_s2", "field_range_ut"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, more than zero")
+        if not self.gps_weight_s > 0.0:
+            raise ValueError(f"gps_weight_s is {self.gps_weight_s} s; it must be more than zero")
+        if not abs(self.declination_rad) <= math.pi:
+            raise ValueError(f"declination_rad is {self.declination_rad} rad; it must be -pi to pi")
+
+
+_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
+_OF_PARAMS = tuple(f.name for f in fields(DilshadParams) if f.name not in ("calibration", *_RANGES))
+_STATE = (
+    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
+    Column("omega_p_b", (3,), "proportional rate correction"),
+    Column("omega_i_b", (3,), "integral rate correction; minus the offset still found"),
+    Column("omega_total_b", (3,), "corrected rate that is integrated"),
+    Column("roll_pitch_b", (3,), "roll-pitch correction"),
+    Column("yaw_b", (3,), "yaw correction"),
+    Column("total_b", (3,), "weighted sum"),
+    Column("heading_rad", (), "last heading of the magnetometer, Eqn 7, uncorrected"),
+    Column("heading_age_s", (), "time since it"),
+    Column("heading_due_s", (), "time saved up for the next one"),
+    Column("correction_rad", (), "what the GPS has found the magnetometer's heading to lack"),
+    Column("drift", (), "yaw still wanted, about down: sine of the angle, of size 1 beyond a right angle"),
+    Column("turned_rad", (), "what the nose has turned since the course was true"),
+    Column("p_e_m", (2, 2), "the last two positions, north and east, the newer one first"),
+    Column("p_age_s", (2,), "and how old they are"),
+    Column("courses", (), "courses taken so far", integer=True),
+    Column("aligned", (), "1 once the magnetometer has set the heading", integer=True),
+)
+STATE_DTYPE = dtype_of(
+    (
+        *BELIEF,
+        *SCREEN,
+        *FIELD,
+        *(Column(name, (), "see DilshadParams") for name in _OF_PARAMS),
+        *_STATE,
+    )
+)
+
+
+@kernel
+def heading_of_field(m, f):  # type: ignore[no-untyped-def]
+    """Magnetic heading square to the wings, from north over east (Eqns 5 to 7); NaN where there is none.
+
+    Parameters
+    ----------
+    m : shape (3,)   field, body axes      f : shape (3,)   specific force of something that is not accelerated
+    """
+    # The paper's axes: forward, left, up.
+    mx, my, mz = m[0], -m[1], -m[2]
+    fx, fy, fz = f[0], -f[1], -f[2]
+    # Up, seen from a body that was rolled by r and then turned about y by p: (-sin p cos r, sin r, cos p cos r).
+    across = np.sqrt(fx * fx + fz * fz)
+    length = np.sqrt(across * across + fy * fy)
+    sin_r, cos_r = fy / length, across / length
+    sin_p, cos_p = -fx / across, fz / across
+    x = mx * cos_p + mz * sin_p  # Eqn 5
+    y = mx * sin_r * sin_p + my * cos_r - mz * sin_r * cos_p  # Eqn 6
+    return np.arctan2(y, x)  # Eqn 7
+
+
+@kernel
+def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
+    """The rate to integrate: gyro less offset and plus corrections; ``s.omega_b_rad_s`` is it without P."""
+    for i in range(3):
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
+    take_rate(row, s, good)
+    for i in range(3):
+        s.omega_total_b[i] = s.omega_b_rad_s[i] + s.omega_p_b[i]
+
+
+@kernel
+def set_heading(R_eb, heading_rad):  # type: ignore[no-untyped-def]
+    """Turn the matrix about the vertical, in place, until this heading is square to the wings, as Eqn 7's is."""
+    by = heading_rad - np.arctan2(-R_eb[0, 1], R_eb[1, 1])
+    c, z = np.cos(by), np.sin(by)
+    for j in range(3):
+        x, y = R_eb[0, j], R_eb[1, j]
+        R_eb[0, j], R_eb[1, j] = c * x - z * y, z * x + c * y
+
+
+@kernel
+def take_heading(row, s, good):  # type: ignore[no-untyped-def]
+    """Every 125 ms, see how far the yaw has drifted from the magnetometer's heading; the first one sets it."""
+    s.heading_age_s += s.dt_s
+    s.heading_due_s = min(s.heading_due_s + s.dt_s, 2.0 * s.yaw_every_s)
+    if s.heading_age_s > HEADING_LIFE_S:
+        s.drift = 0.0
+    came = take_field(row, s)
+    if not (came and good & FORCE_GOOD and s.heading_due_s >= s.yaw_every_s):
+        return
+    heading = heading_of_field(s.field_b_ut, row.force_b_m_s2) + s.declination_rad
+    if not np.isfinite(heading):  # falling freely, or no field
+        return
+    s.heading_due_s -= s.yaw_every_s
+    s.heading_age_s, s.heading_rad = 0.0, heading
+    heading += s.correction_rad
+    if not s.aligned:
+        s.aligned = 1
+        set_heading(s.R_eb, heading)
+    hx, hy = np.cos(heading), np.sin(heading)
+    x, y = s.R_eb[1, 1], -s.R_eb[0, 1]  # square to the wings
+    s.drift = x * hy - y * hx  # Premerlani's Eqn 23
+    if x * hx + y * hy < 0.0:
+        s.drift = np.copysign(np.hypot(x, y), s.drift)
+
+
+@kernel
+def take_course(row, s):  # type: ignore[no-untyped-def]
+    """Correct the magnetometer by the course from three consecutive positions (section e, Eqn 9)."""
+    w, dt = s.omega_b_rad_s, s.dt_s
+    rate = w[0] * s.R_eb[2, 0] + w[1] * s.R_eb[2, 1] + w[2] * s.R_eb[2, 2]
+    s.turned_rad += dt * rate - min(dt / s.gps_lag_s, 1.0) * s.turned_rad
+    s.p_age_s[0] += dt
+    s.p_age_s[1] += dt
+    if not row.gps_new:
+        return
+    x, y = row.gps_p_e_m[0], row.gps_p_e_m[1]
+    if not (abs(x) < 1e6 and abs(y) < 1e6):
+        s.rejected += 1
+        return
+    first_s, second_s = s.p_age_s[1] - s.p_age_s[0], s.p_age_s[0]
+    # Two velocities between three positions, and their average.
+    vx = 0.5 * ((x - s.p_e_m[0, 0]) / second_s + (s.p_e_m[0, 0] - s.p_e_m[1, 0]) / first_s)
+    vy = 0.5 * ((y - s.p_e_m[0, 1]) / second_s + (s.p_e_m[0, 1] - s.p_e_m[1, 1]) / first_s)
+    near = second_s <= LONGEST_STEP_S and first_s <= LONGEST_STEP_S
+    s.p_e_m[1, 0], s.p_e_m[1, 1], s.p_age_s[1] = s.p_e_m[0, 0], s.p_e_m[0, 1], s.p_age_s[0]
+    s.p_e_m[0, 0], s.p_e_m[0, 1], s.p_age_s[0] = x, y, 0.0
+    straight = abs(s.turned_rad) <= STRAIGHT_RAD and s.heading_age_s <= HEADING_LIFE_S
+    # Positions 0.2 s apart that are 0.3 m wrong make 1 m/s out of nothing; the receiver's own speed does not.
+    moving = s.min_speed_m_s <= row.gps_speed_m_s <= FASTEST_M_S and np.hypot(vx, vy) <= FASTEST_M_S  # NaN is not
+    if not (near and straight and moving):
+        return
+    course = np.arctan2(vy, vx) + s.turned_rad  # Eqn 9, and what has been turned since
+    s.courses += 1
+    part = max(1.0 / s.courses, min(second_s / s.gps_weight_s, 1.0))  # a mean at first, then one that forgets
+    if s.gps_weight_s < np.inf:
+        s.correction_rad = wrap(s.correction_rad + part * wrap(course - s.heading_rad - s.correction_rad))
+
+
+@kernel
+def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
+    """Fill ``s.roll_pitch_b``: down as the accelerometer has it x down as estimated (Premerlani's Eqn 27, mended)."""
+    f = row.force_b_m_s2
+    length = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+    scale = -1.0 / length if length > 0.0 else 0.0
+    x, y, z = s.R_eb[2, 0], s.R_eb[2, 1], s.R_eb[2, 2]
+    s.roll_pitch_b[0] = scale * (f[1] * z - f[2] * y)
+    s.roll_pitch_b[1] = scale * (f[2] * x - f[0] * z)
+    s.roll_pitch_b[2] = scale * (f[0] * y - f[1] * x)
+
+
+@kernel
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One sample, in the order of the paper's Fig. 8; returns the `Health`."""
+    row, s = rows[k], state[0]
+    before = s.rejected
+    good = screen(row, s)
+    if good:
+        corrected_rate(row, s, good)
+        integrate(s.R_eb, s.omega_total_b, s.dt_s)
+        if good & FORCE_GOOD:
+            roll_pitch_correction(row, s)
+        else:
+            s.roll_pitch_b[0] = s.roll_pitch_b[1] = s.roll_pitch_b[2] = 0.0
+        take_heading(row, s, good)
+        take_course(row, s)
+        for i in range(3):
+            s.yaw_b[i] = s.drift * s.R_eb[2, i]  # Premerlani's Eqn 24
+        weigh(s.w_rp, s.roll_pitch_b, s.w_y, s.yaw_b, s.total_b)
+        feed_back(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
+    if s.rejected != before:
+        return 2  # Health.POOR
+    if not s.aligned:
+        return 0  # Health.STARTING
+    return 1 if s.heading_age_s <= HEADING_LIFE_S else 2  # Health.GOOD
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+
+
+def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
+    """Roll, pitch and yaw [rad] as the paper reads them off its matrix (Eqns 10 to 12), each of shape (...).
+
+    For people who compare with the paper: yaw is within 90 degrees of north, where roll and pitch mean nothing.
+    """
+    # The paper's matrix is D R_eb D with D = diag(1, -1, -1): elements between x and the others change their sign.
+    r_xx, r_xy, r_xz = R_eb[..., 0, 0], -R_eb[..., 0, 1], -R_eb[..., 0, 2]
+    r_yy, r_zy = R_eb[..., 1, 1], R_eb[..., 2, 1]
+    return np.arctan2(r_zy, r_yy), -np.arctan2(r_xz, r_xx), np.arcsin(np.clip(r_xy, -1.0, 1.0))
+
+
+class Dilshad(Compiled):
+    """The paper's estimator; see the module for what it corrects and what it leaves."""
+
+    heading_reference: HeadingReference = "course"  # in the long run, through the GPS
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer")
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
+
+    def __init__(self, params: DilshadParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or DilshadParams()
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: gyro offset and tilt from the mean sample of something at rest; the first field sets the heading.
+
+        Without a sample (a start in the air), or where it is not of something at rest: offset zero, level.
+        """
+        s = self._state[0]
+        self._state.fill(0)
+        for name in (*_OF_PARAMS, *_RANGES):
+            s[name] = getattr(self.params, name)
+        for f in fields(Calibration):
+            s[f.name] = getattr(self.params.calibration, f.name)
+        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+        s["heading_age_s"] = s["p_age_s"] = math.inf
+        s["heading_due_s"] = s["yaw_every_s"]

@@ -1,0 +1,415 @@
+"""Roll-pitch drift from the change of GPS velocity: Premerlani's note of 2011, with a yaw reference of one's choice.
+
+An accelerometer feels gravity minus acceleration (Eqn 1), and the attitude carries that into the earth frame
+(Eqn 2).  Integrated between two GPS reports it must be what gravity and the change of the reported velocity leave
+(Eqn 3); the cross product of the two sides is the error of the attitude (Eqns 4 and 5).  No airspeed, no angle of
+attack and no sideslip is assumed, so the method holds in turns, in wind and in loops, where the centrifugal
+term of the first paper does not.
+
+Lag
+---
+A receiver reports velocity filtered and late.  The left side of Eqn 3, and the nose, pass the same filter and are
+recalled from one latency ago, with all corrections that were made since (`estimator.gyro_frame`).  An error found at a
+report is removed evenly until the next one, by 1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
+
+Yaw
+---
+``course`` and ``nose``: the matrix itself is turned to the nose, which is where the velocity through the air points
+(Eqns 22 to 24 of the paper of 2009, with v_gps - wind for the course).  The wind is learnt in turns
+(`estimator.wind`); as long as none has been flown that is the course over ground.  ``course`` then tells the heading
+of the paper: the matrix is handed out turned by the crab angle.  So Eqn 4 compares along the true heading whatever is
+told; along the course a crab of 23 degrees becomes a tilt in every turn.  ``magnetometer``: to magnetic north.
+
+Before the yaw is locked
+------------------------
+With an unknown heading an acceleration along the ground is taken for a tilt: in a launch by 11 degrees.  Until the
+nose has come near the reference, and where no reports come, the paper of 2009 stands in (Eqns 25 to 27): the
+acceleration is the speed times the turning of the nose.  Summed up, that is Eqn 3 with the velocity along the nose.
+And nothing is corrected while the length of what is then taken for gravity is not gravity's.
+
+References
+----------
+W. Premerlani, "Roll-Pitch Gyro Drift Compensation", 2011.
+W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.gyro_frame import (
+    GYRO_FRAME,
+    LONGEST_LATENCY_S,
+    apply_corrections,
+    attitude,
+    recall,
+    start_gyro_frame,
+    sum_up,
+    to_earth,
+)
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.jit import inlined, kernel
+from estimator.pi import feed_back
+from estimator.screening import (
+    FORCE_RANGE_M_S2,
+    G_M_S2,
+    GYRO_RANGE_RAD_S,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    screen,
+    take_rate,
+)
+from estimator.wind import WIND_FILTER, learn_wind
+
+FIX_LIFE_S = 2.5  # reports further apart are compared no more
+LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown
+STAND_IN_S = 0.1  # how often the paper's correction is worked out where it stands in
+LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this close for this long
+COURSE, NOSE, MAGNETOMETER = 0, 1, 2
+YAW_REFERENCES = ("course", "nose", "magnetometer")
+
+YawReference = Literal["course", "nose", "magnetometer"]
+
+
+@dataclass(frozen=True, slots=True)
+class GpsVelocityParams:
+    """Gains and options.
+
+    yaw_reference : str        what the heading converges to: "course", "nose" or "magnetometer"
+    w_rp, w_y : float          weights of the roll-pitch and the yaw error (Eqn 28 of the paper).  Large: errors go
+                               quickly, noise of the reports gets in
+    w_start : float            weight of the paper's roll-pitch correction while it stands in
+    k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
+    offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
+    integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
+    gps_filter_s : float       time constant of the receiver's velocity filter
+    gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
+    launch_gate : float        the stand-in corrects nothing while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
+    min_speed_m_s : float      slowest speed at which a velocity tells a heading
+    declination_rad : float    of magnetic from true north, positive east; for the magnetometer
+    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
+    """
+
+    yaw_reference: YawReference = "course"
+    w_rp: float = 0.5
+    w_y: float = 1.0
+    w_start: float = 0.3
+    k_p: float = 1.0
+    k_i: float = 0.03
+    offset_limit_rad_s: float = math.radians(6.0)
+    integrate_below_rad_s: float = math.radians(60.0)
+    gps_filter_s: float = 1.0
+    gps_latency_s: float = 0.3
+    launch_gate: float = 0.2
+    min_speed_m_s: float = 3.0
+    declination_rad: float = 0.0
+    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
+    force_range_m_s2: float = FORCE_RANGE_M_S2
+
+    def __post_init__(self) -> None:
+        if self.yaw_reference not in YAW_REFERENCES:
+            raise ValueError(f"yaw_reference is {self.yaw_reference!r}; it must be one of {', '.join(YAW_REFERENCES)}")
+        positive = (
+            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2",
+        )  # fmt: skip
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.name == "yaw_reference":
+                continue
+            if f.name == "declination_rad":
+                if not abs(value) <= math.pi:
+                    raise ValueError(f"declination_rad is {value} rad; it must be -pi to pi")
+            elif f.name in positive:
+                if not value > 0.0:
+                    raise ValueError(f"{f.name} is {value}; it must be more than zero")
+            elif not 0.0 <= value < math.inf:
+                raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
+        for name in ("gyro_range_rad_s", "force_range_m_s2"):
+            if getattr(self, name) > 1e4:
+                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
+        if self.gps_latency_s > LONGEST_LATENCY_S:
+            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
+
+
+_PARAMS = tuple(
+    Column(f.name, (), "see GpsVelocityParams", integer=f.name == "yaw_reference")
+    for f in fields(GpsVelocityParams)
+    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
+)
+_STATE = (
+    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
+    Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
+    Column("since_fix_g_m_s", (3,), "left side of Eqn 3 over the last interval"),
+    Column("fix_t_s", (), "when the last fix was true, by the clock of the state"),
+    Column("interval_s", (), "from the fix before it"),
+    Column("v_e_m_s", (3,), "velocity of the last fix"),
+    Column("fix_age_s", (), "time since a fix arrived"),
+    Column("mag_t_s", (), "when the magnetometer spoke last"),
+    Column("stand_in_t_s", (), "start of the interval of the stand-in"),
+    Column("stand_in_g", (6,), "felt integral and nose then"),
+    Column("error_e", (3,), "the error being worked on, earth axes, Eqn 4"),
+    Column("error_g", (3,), "the same, or another vector, axes of the gyros' earth"),
+    Column("total_b", (3,), "weighted error, Eqn 28"),
+    Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
+    Column("near_s", (), "how long the yaw error has been small"),
+    Column("locked", (), "1 once yaw was found", integer=True),
+)
+STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + GYRO_FRAME + _PARAMS + _STATE)
+
+
+@kernel
+def correct(s, error_e, weight, k_i, interval_s, rate_e):  # type: ignore[no-untyped-def]
+    """Give an error to the PI controller (Eqns 5, 28 and 29) and set `rate_e`, which removes it within the interval."""
+    for i in range(3):
+        s.error_g[i] = s.R_eg[0, i] * error_e[0] + s.R_eg[1, i] * error_e[1] + s.R_eg[2, i] * error_e[2]
+    for i in range(3):
+        along = s.R_gb[0, i] * s.error_g[0] + s.R_gb[1, i] * s.error_g[1] + s.R_gb[2, i] * s.error_g[2]  # Eqn 5
+        s.total_b[i] = weight * along
+    w = s.omega_b_rad_s
+    turning = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]) >= s.integrate_below_rad_s
+    decay = s.k_p * weight * interval_s
+    k_p = s.k_p * (-np.expm1(-decay) / decay if decay > 0.0 else 1.0)
+    feed_back(s.total_b, k_p, 0.0 if turning else k_i, s.offset_limit_rad_s, interval_s, s.omega_p_b, s.omega_i_b)
+    for i in range(3):
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
+        rate_e[i] = k_p * weight * error_e[i]
+
+
+@kernel
+def correct_tilt(s, error_e, weight, interval_s):  # type: ignore[no-untyped-def]
+    """Roll-pitch error, earth axes, to be removed within `interval_s`."""
+    correct(s, error_e, weight, s.k_i, interval_s, s.tilt_rate_e)
+    s.tilt_left_s = interval_s
+
+
+@kernel
+def correct_yaw(s, sine, cosine, length, interval_s):  # type: ignore[no-untyped-def]
+    """Yaw error: `sine` and `cosine` of the angle still to turn, both times `length`, which weighs it.
+
+    The cross product of Eqn 23 fades beyond a right angle: there its sign is kept, at full strength.
+    """
+    near = cosine > 0.0 and abs(sine) < np.tan(LOCK_RAD) * cosine
+    s.near_s = s.near_s + interval_s if near else 0.0
+    if s.near_s >= LOCK_S:
+        s.locked = 1
+    ground = sine if cosine >= 0.0 else np.copysign(length, sine)  # Eqn 23
+    s.error_e[0] = s.error_e[1] = 0.0
+    s.error_e[2] = ground  # Eqn 24: along the vertical
+    k_i = s.k_i if s.locked else 0.0  # finding the yaw is no gyro offset
+    correct(s, s.error_e, s.w_y, k_i, interval_s, s.yaw_rate_e)
+    s.yaw_left_s = interval_s
+
+
+@kernel
+def roll_pitch_at_fix(s, dv_e_m_s):  # type: ignore[no-untyped-def]
+    """Eqns 3 and 4 over the interval between two fixes, `dv_e_m_s` the change of the reported velocity."""
+    left0, left1, left2 = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
+    right0, right1, right2 = -dv_e_m_s[0], -dv_e_m_s[1], s.interval_s * G_M_S2 - dv_e_m_s[2]
+    # Eqn 4, divided by both lengths; by no less than half of gravity's, so that a fall without weight says little.
+    least = 0.5 * s.interval_s * G_M_S2
+    left_length = max(np.sqrt(left0 * left0 + left1 * left1 + left2 * left2), least)
+    right_length = max(np.sqrt(right0 * right0 + right1 * right1 + right2 * right2), least)
+    scale = 1.0 / (left_length * right_length)
+    s.error_e[0] = scale * (left1 * right2 - left2 * right1)
+    s.error_e[1] = scale * (left2 * right0 - left0 * right2)
+    s.error_e[2] = scale * (left0 * right1 - left1 * right0)
+    correct_tilt(s, s.error_e, s.w_rp, s.interval_s)
+
+
+@kernel
+def stand_in(s):  # type: ignore[no-untyped-def]
+    """The paper's roll-pitch correction (Eqns 25 to 27) over the time since it was last worked out.
+
+    Integrated, omega x V is the speed times the change of the nose.
+    """
+    apply_corrections(s)
+    interval_s = s.clock_s - s.stand_in_t_s
+    speed = 0.0
+    if s.fix_age_s <= LOCK_LIFE_S:
+        speed = np.hypot(s.air_m_s[0], s.air_m_s[1]) if s.wind_known else np.hypot(s.v_e_m_s[0], s.v_e_m_s[1])
+    for i in range(3):
+        felt, nose = s.felt_g_m_s[i], s.R_gb[i, 0]
+        s.error_e[i] = felt - s.stand_in_g[i] + speed * (nose - s.stand_in_g[3 + i])  # Eqns 25 and 26
+        s.stand_in_g[i], s.stand_in_g[3 + i] = felt, nose
+    s.stand_in_t_s = s.clock_s
+    if interval_s > 2.0 * STAND_IN_S or s.unfelt_s > 0.0:
+        return
+    x, y, z = to_earth(s, s.error_e)
+    length = np.sqrt(x * x + y * y + z * z)
+    if length > 0.0 and abs(length / (interval_s * G_M_S2) - 1.0) <= s.launch_gate:
+        s.error_e[0], s.error_e[1], s.error_e[2] = y / length, -x / length, 0.0  # Eqn 27: seen in earth, x down
+        correct_tilt(s, s.error_e, s.w_start, interval_s)
+
+
+@kernel
+def yaw_at_fix(s):  # type: ignore[no-untyped-def]
+    """Learn the wind, and compare the nose of the fix with the velocity over the ground or through the air."""
+    north, east, _ = to_earth(s, s.at_fix_g[3:])
+    v_north, v_east = s.v_e_m_s[0], s.v_e_m_s[1]
+    if np.hypot(v_north, v_east) < s.min_speed_m_s:
+        return
+    c, z = np.cos(s.yaw_applied_rad), np.sin(s.yaw_applied_rad)
+    learn_wind(s, c * north + z * east, c * east - z * north, v_north, v_east, s.interval_s)
+    if s.yaw_reference == MAGNETOMETER:
+        return
+    # The nose of now, and the velocity through the air that is expected along it.
+    x, y, _ = to_earth(s, s.R_gb[:, 0])
+    f0, f1 = c * x + z * y, c * y - z * x
+    air0, air1 = s.air_m_s[0] * f0 - s.air_m_s[1] * f1, s.air_m_s[0] * f1 + s.air_m_s[1] * f0
+    speed = np.hypot(air0, air1)
+    if speed < s.min_speed_m_s:
+        return
+    sine, cosine = (x * air1 - y * air0) / speed, (x * air0 + y * air1) / speed
+    correct_yaw(s, sine, cosine, np.hypot(x, y), s.interval_s)
+    if s.yaw_reference == COURSE:
+        over0, over1 = air0 + s.wind_e_m_s[0], air1 + s.wind_e_m_s[1]
+        over = np.hypot(over0, over1)
+        if over >= s.min_speed_m_s:
+            s.crab[0] = (air0 * over0 + air1 * over1) / (speed * over)
+            s.crab[1] = (air0 * over1 - air1 * over0) / (speed * over)
+
+
+@kernel
+def take_fix(row, s):  # type: ignore[no-untyped-def]
+    """All that happens at a GPS report."""
+    v = row.gps_v_e_m_s
+    if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
+        s.rejected += 1
+        return
+    apply_corrections(s)
+    before0, before1, before2 = s.at_fix_g[0], s.at_fix_g[1], s.at_fix_g[2]
+    t_s = s.clock_s - s.gps_latency_s
+    recall(s, t_s)
+    s.since_fix_g_m_s[0] = s.at_fix_g[0] - before0
+    s.since_fix_g_m_s[1] = s.at_fix_g[1] - before1
+    s.since_fix_g_m_s[2] = s.at_fix_g[2] - before2
+    s.interval_s = t_s - s.fix_t_s
+    s.fix_t_s, s.fix_age_s = t_s, 0.0
+    for i in range(3):
+        s.error_e[i] = v[i] - s.v_e_m_s[i]
+        s.v_e_m_s[i] = v[i]
+    if 0.0 < s.interval_s <= FIX_LIFE_S:
+        if s.locked and s.clock_s >= s.blind_until_s:
+            roll_pitch_at_fix(s, s.error_e)
+        yaw_at_fix(s)
+
+
+@kernel
+def take_mag(row, s):  # type: ignore[no-untyped-def]
+    """Turn the nose by what the horizontal field is off magnetic north."""
+    m = row.mag_b_ut
+    if not (abs(m[0]) < 1e4 and abs(m[1]) < 1e4 and abs(m[2]) < 1e4):
+        s.rejected += 1
+        return
+    apply_corrections(s)
+    for i in range(3):
+        s.error_g[i] = s.R_gb[i, 0] * m[0] + s.R_gb[i, 1] * m[1] + s.R_gb[i, 2] * m[2]
+    north, east, _ = to_earth(s, s.error_g)
+    length, interval_s = np.hypot(north, east), s.clock_s - s.mag_t_s
+    s.mag_t_s = s.clock_s
+    if length > 0.0 and 0.0 < interval_s <= FIX_LIFE_S:
+        c, z = np.cos(s.declination_rad), np.sin(s.declination_rad)
+        sine, cosine = (north * z - east * c) / length, (north * c + east * z) / length
+        correct_yaw(s, sine, cosine, 1.0, interval_s)
+
+
+@inlined
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One inertial sample, and the report that came with it.
+
+    Parameters
+    ----------
+    rows : shape (N,), MEASURED_DTYPE    not written
+    k : int                              the tick
+    state : shape (1,), STATE_DTYPE      read and written
+
+    Returns
+    -------
+    int    the `Health` of this tick's estimate
+    """
+    row, s = rows[k], state[0]
+    before, t_before = s.rejected, s.t_s
+    good = screen(row, s)
+    if good:
+        take_rate(row, s, good)  # Eqn 16
+        if not sum_up(row, s, good, s.t_s - t_before):
+            s.locked = 0
+        attitude(s)
+        s.fix_age_s += s.dt_s
+        if row.gps_new:
+            take_fix(row, s)
+        if row.mag_new and s.yaw_reference == MAGNETOMETER:
+            take_mag(row, s)
+        if s.fix_age_s > LOCK_LIFE_S and s.yaw_reference != MAGNETOMETER:
+            s.locked = 0
+        if not (s.locked and s.fix_age_s <= FIX_LIFE_S) and s.clock_s - s.stand_in_t_s >= STAND_IN_S:
+            stand_in(s)
+    if s.rejected != before:
+        return 2  # Health.POOR
+    if not s.locked:
+        return 0  # Health.STARTING
+    return 1 if s.fix_age_s <= FIX_LIFE_S else 2  # Health.GOOD
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+        write_wind(state[0], estimates[k])
+
+
+class GpsVelocity(Compiled):
+    """The note's estimator; see the module.
+
+    Parameters
+    ----------
+    params : gains and options; the defaults suit a model aeroplane with a 1 s, 0.3 s late GPS.  `heading_reference`
+        follows from their `yaw_reference`: "course", or "nose" for the other two
+    """
+
+    heading_reference: HeadingReference = "course"
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
+    _default: ClassVar[GpsVelocityParams] = GpsVelocityParams()
+
+    def __init__(self, params: GpsVelocityParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or self._default
+        self.heading_reference = "course" if self.params.yaw_reference == "course" else "nose"
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
+
+        Without a sample (a start in the air), or where it is not of something at rest: offset zero, level.
+        """
+        s = self._state[0]
+        self._state.fill(0)
+        for f in fields(self.params):
+            value = getattr(self.params, f.name)
+            s[f.name] = YAW_REFERENCES.index(value) if f.name == "yaw_reference" else value
+        R = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        start_gyro_frame(s, R)
+        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+        s["fix_age_s"] = math.inf
+        s["fix_t_s"] = s["mag_t_s"] = -math.inf
+        s["stand_in_g"][3:] = R[:, 0]
+
+
+class GpsVelocityNose(GpsVelocity):
+    """The same, its heading that of the nose: the wind is learnt in turns and taken off the GPS velocity."""
+
+    _default = GpsVelocityParams(yaw_reference="nose")
+
+
+class GpsVelocityMagnetometer(GpsVelocity):
+    """The same, its heading that of the nose, from the magnetometer."""
+
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer")
+    _default = GpsVelocityParams(yaw_reference="magnetometer")

@@ -1,0 +1,420 @@
+"""The bound: an inertial navigation filter that models the sensors, for what the simpler estimators leave undone.
+
+An error-state Kalman filter of twenty states (`estimator.ins_ekf_kernels`): attitude, velocity, gyro bias and gain,
+accelerometer bias, the velocity inside the GPS receiver behind its filter, and the horizontal wind.  It is told how
+good its sensors are, and tells how good its estimate is (`InsEkf.sigma`).
+
+*Delayed horizon.*  A fix is old when it comes.  The filter therefore lives as far back as the oldest fix can be;
+inertial samples wait in a buffer, each fix beside the sample in which it was true.  The attitude of the present is
+that of the filter, turned on by the gyro samples that wait, and anew after every correction.
+
+*Sideslip.*  An aeroplane flies where its nose points: that the velocity through the air has no part along the wing
+is a measurement five times a second.  It parts nose and course, and so tells wind and heading.
+
+*Heading at the start.*  A Kalman filter bears no error of half a turn.  Until the aeroplane moves, the heading is
+left at north and does no harm: nothing measured has a direction.  The throw is then integrated like any motion, in
+a frame of unknown heading; once the GPS reports a velocity, the angle between that and the velocity believed to
+be inside the receiver is the error of heading, whatever the wind.  The whole estimate is turned by it, and the fix
+is then taken in with the heading (and the velocities that turn with it) held for uncertain by a radian.  A start in the
+air is the same, with one more unknown: the speed along the nose, which is what makes the velocities equally long.
+
+*Readings cut off* at full scale: for these samples the process noise is that of what may be missing.
+
+*Without GPS* for two seconds, velocity through the air is believed to be what it was, along the nose, with a large
+sigma; without any velocity ever, zero.  That is gravity aiding, weak enough for turns, for as long as it lasts.
+
+*Refused fixes.*  An innovation beyond `gate` sigmas is refused and counted.  Where nothing is believed for three
+seconds the filter is wrong, not the receiver: it starts again in the air, from its attitude.
+
+The earth's rotation (15 deg/h) and curvature are left out; they are below the gyro's walk.
+
+References
+----------
+J. Sola, "Quaternion kinematics for the error-state Kalman filter", 2017, arXiv:1711.02508.
+A. Khosravian, J. Trumpf, R. Mahony, T. Hamel, "State estimation for invariant systems on Lie groups with delayed
+output measurements", Automatica 2016: observer on delayed data, predictor to the present.
+T. A. Johansen et al., "On estimation of wind velocity, angle-of-attack and sideslip angle of small UAVs using
+standard sensors", ICUAS 2015.
+"""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimator.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
+from estimator.ins_ekf_flight import (
+    CUT_FORCE,
+    CUT_GYRO,
+    FIX_LIFE_S,
+    HAS_AIR,
+    HAS_FIX,
+    HAS_MAG,
+    SIZE,
+    advance_filter,
+    start_at_rest,
+    start_in_air,
+)
+from estimator.ins_ekf_kernels import (
+    BIAS,
+    FORCE,
+    FULL,
+    GAIN,
+    LAG,
+    TILT,
+    VEL,
+    WIND_NE,
+    N,
+    true_rate,
+    turn_in_body,
+)
+from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.jit import kernel
+from estimator.rotation import level, renormalise
+from estimator.screening import (
+    FORCE_GOOD,
+    FORCE_RANGE_M_S2,
+    G_M_S2,
+    GYRO_GOOD,
+    GYRO_RANGE_RAD_S,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    screen,
+)
+
+LONGEST_LATENCY_S = 12.5
+LONGEST_STAMPED_S = 2.0  # a stamp further back is of another clock
+COAST_S = 0.25  # how long the last rate stands in for a broken gyro
+WIND_KNOWN_M_S = 1.5  # sigma, both axes together, of a wind worth telling
+GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigmas of a good attitude
+
+
+@dataclass(frozen=True, slots=True)
+class InsEkfParams:
+    """What the filter believes of its sensors and of the air; the defaults are the generic sensors.
+
+    Each sigma too small makes the estimate overconfident and slow to mend, too large noisy and slow to learn.
+
+    gyro_noise_rad_s_sqrt_hz : float    one-sided density of the white noise, quantisation included
+    gyro_bias_sigma_rad_s : float       of the bias at power-up, after a calibration if there was one
+    gyro_walk_rad_s_sqrt_s : float      the bias walks, sigma after one second
+    gyro_gain_sigma : float             of the relative gain error of each axis
+    gyro_cross_axis : float             of each axis' sensitivity to another
+    gyro_full_scale_rad_s : float       readings near it or beyond may be cut off
+    force_noise_m_s2_sqrt_hz : float    one-sided density of the accelerometer's white noise
+    force_bias_sigma_m_s2 : float       of its bias
+    force_full_scale_m_s2 : float       readings near it or beyond may be cut off
+    gps_noise_m_s : float               of each velocity component of a fix
+    gps_filter_s : float                time constant of the receiver's velocity filter; 0 is none
+    gps_latency_s : float               from the moment a fix is true to its arrival, at most 12.5
+    gps_stamped : bool                  believe the fix's own time stamp instead, where it is at most 2 s old
+    gps_lag_sigma_s : float             how well filter and latency are known; inflates a fix while turning
+    wind_sigma_m_s : float              of each horizontal component of the wind
+    wind_walk_m_s_sqrt_s : float        the wind walks, sigma after one second
+    sideslip_sigma_m_s : float          of the velocity along the wing, by slip and gusts, every 0.2 s
+    use_airspeed : bool                 believe air data where they come
+    airspeed_noise_m_s : float          sigma of an airspeed
+    use_magnetometer : bool             believe the magnetometer's heading where it comes (calibrated, that is)
+    declination_rad : float             magnetic north from true north, positive to the east
+    magnetic_noise_rad : float          sigma of a magnetic heading
+    min_speed_m_s : float               slowest ground speed that starts the heading
+    gate : float                        innovations beyond so many sigmas are refused
+    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
+    """
+
+    gyro_noise_rad_s_sqrt_hz: float = math.radians(0.07)
+    gyro_bias_sigma_rad_s: float = math.radians(1.0)
+    gyro_walk_rad_s_sqrt_s: float = math.radians(0.02)
+    gyro_gain_sigma: float = 0.015
+    gyro_cross_axis: float = 0.005
+    gyro_full_scale_rad_s: float = math.radians(300.0)
+    force_noise_m_s2_sqrt_hz: float = 0.004 * G_M_S2
+    force_bias_sigma_m_s2: float = 0.02 * G_M_S2
+    force_full_scale_m_s2: float = 3.0 * G_M_S2
+    gps_noise_m_s: float = 0.1
+    gps_filter_s: float = 1.0
+    gps_latency_s: float = 0.3
+    gps_stamped: bool = True
+    gps_lag_sigma_s: float = 0.02
+    wind_sigma_m_s: float = 4.0
+    wind_walk_m_s_sqrt_s: float = 0.1
+    sideslip_sigma_m_s: float = 1.4
+    use_airspeed: bool = True
+    airspeed_noise_m_s: float = 1.0
+    use_magnetometer: bool = False
+    declination_rad: float = 0.0
+    magnetic_noise_rad: float = math.radians(5.0)
+    min_speed_m_s: float = 3.0
+    gate: float = 5.0
+    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
+    force_range_m_s2: float = FORCE_RANGE_M_S2
+
+    def __post_init__(self) -> None:
+        may_be_zero = (
+            "gyro_walk_rad_s_sqrt_s", "gyro_cross_axis", "gps_filter_s", "gps_latency_s", "gps_lag_sigma_s",
+            "wind_walk_m_s_sqrt_s", "declination_rad",
+        )  # fmt: skip
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(f.default, bool):
+                continue
+            if f.name == "declination_rad":
+                if not abs(value) <= math.pi:
+                    raise ValueError(f"declination_rad is {value} rad; it must lie between -pi and pi")
+            elif not 0.0 <= value < math.inf or (value == 0.0 and f.name not in may_be_zero):
+                least = "zero or more" if f.name in may_be_zero else "more than zero"
+                raise ValueError(f"{f.name} is {value}; it must be a finite number, {least}")
+        for name in ("gyro_range_rad_s", "force_range_m_s2"):
+            if getattr(self, name) > 1e4:
+                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
+        if self.gps_latency_s > LONGEST_LATENCY_S:
+            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
+
+
+_PARAMS = tuple(
+    Column(f.name, (), "see InsEkfParams", integer=isinstance(f.default, bool))
+    for f in fields(InsEkfParams)
+    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
+)
+_FILTER = (
+    Column("R_filter_eb", (3, 3), "attitude at the filter's time"),
+    Column("v_e_m_s", (3,), "velocity over the ground, at the filter's time"),
+    Column("gyro_gain", (3,), "what the gyro reads too much, per unit of rate"),
+    Column("force_bias_b_m_s2", (3,), "what the accelerometer reads too much"),
+    Column("lagged_v_e_m_s", (3,), "velocity inside the receiver, behind its filter"),
+    Column("lagged_rate_m_s2", (3,), "how fast that changes"),
+    Column("filter_clock_s", (), "the filter's time"),
+    Column("P", (N, N), "covariance of the error state"),
+    Column("h", (N,), "gradient of a measurement"),
+    Column("gain", (N,), "Kalman gain"),
+    Column("left", (N,), "covariance times gradient"),
+    Column("R_half", (3, 3), "attitude in the middle of the last sample"),
+    Column("rate_b", (3,), "rate in it"),
+    Column("force_e", (3,), "specific force in it, earth axes"),
+    Column("lag_keep", (), "weight of the old output of the receiver's filter"),
+    Column("lag_end", (), "weight of its newest input"),
+)
+_AROUND = (
+    Column("delay_s", (), "how far back the filter lives"),
+    Column("seeded", (), "1 once the velocity has a start", integer=True),
+    Column("aligned", (), "1 once the heading was found", integer=True),
+    Column("fix_age_s", (), "time since a fix was believed"),
+    Column("refusing_s", (), "time since the first of the fixes refused of late, 0 where the last was believed"),
+    Column("pseudo_s", (), "time since the last pseudo-measurements"),
+    Column("cruise_m_s", (), "airspeed of late, for when the GPS falls silent"),
+    Column("cruise_sigma_m_s", (), "how well it is known"),
+    Column("lift_e_m_s2", (), "mean downward specific force of late: minus gravity, in any flight"),
+    Column("nose_at_start", (2,), "horizontal nose where the filter started"),
+    Column("oldest", (), "index of the oldest waiting sample", integer=True),
+    Column("waiting", (), "how many wait", integer=True),
+    Column("w_clock_s", (SIZE,), "when each waiting sample ended"),
+    Column("w_dt_s", (SIZE,), "the time it accounts for"),
+    Column("w_gyro", (SIZE, 3), "its rate as read"),
+    Column("w_force", (SIZE, 3), "its specific force as read"),
+    Column("w_bits", (SIZE,), "what is to be known of it", integer=True),
+    Column("w_fix_v_e_m_s", (SIZE, 3), "velocity of the fix that was true in it"),
+    Column("w_fix_early_s", (SIZE,), "how long before its end"),
+    Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
+    Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
+)
+STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + _PARAMS + _FILTER + _AROUND)
+
+
+# What waits
+
+
+@kernel
+def push(row, s, good):  # type: ignore[no-untyped-def]
+    """Let the sample of `row` wait; a broken part of it is replaced by what is believed, and marked."""
+    if s.waiting == SIZE:
+        advance_filter(s)
+    i = (s.oldest + s.waiting) % SIZE
+    s.waiting += 1
+    s.w_clock_s[i], s.w_dt_s[i] = s.clock_s, s.dt_s
+    bits = 0
+    for j in range(3):
+        if good & GYRO_GOOD:
+            s.w_gyro[i, j] = row.gyro_b_rad_s[j]
+            s.omega_b_rad_s[j] = true_rate(row.gyro_b_rad_s, s, j)
+        else:
+            if s.bad_s > COAST_S:
+                s.omega_b_rad_s[j] = 0.0
+            s.w_gyro[i, j] = (1.0 + s.gyro_gain[j]) * s.omega_b_rad_s[j] + s.gyro_bias_b_rad_s[j]
+        s.w_force[i, j] = row.force_b_m_s2[j] if good & FORCE_GOOD else -G_M_S2 * s.R_eb[2, j]
+        if not abs(s.w_gyro[i, j]) < FULL * s.gyro_full_scale_rad_s:
+            bits |= CUT_GYRO
+        if not abs(s.w_force[i, j]) < FULL * s.force_full_scale_m_s2:
+            bits |= CUT_FORCE
+    if not good & GYRO_GOOD:
+        bits |= CUT_GYRO
+    if not good & FORCE_GOOD:
+        bits |= CUT_FORCE
+    s.w_bits[i] = bits
+
+
+@kernel
+def attach_fix(row, s):  # type: ignore[no-untyped-def]
+    """Put the fix of `row` beside the waiting sample in which it was true."""
+    v = row.gps_v_e_m_s
+    if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
+        s.rejected += 1
+        return
+    late_s = s.gps_latency_s
+    if s.gps_stamped and 0.0 <= row.t_s - row.gps_t_s <= LONGEST_STAMPED_S:
+        late_s = row.t_s - row.gps_t_s
+    s.delay_s = max(s.delay_s, late_s)
+    i = (s.oldest + s.waiting - 1) % SIZE
+    for back in range(1, s.waiting):
+        earlier = (s.oldest + s.waiting - 1 - back) % SIZE
+        if s.w_clock_s[earlier] < s.clock_s - late_s - 1e-9:
+            break
+        i = earlier
+    s.w_bits[i] |= HAS_FIX
+    s.w_fix_early_s[i] = min(max(s.w_clock_s[i] - (s.clock_s - late_s), 0.0), s.w_dt_s[i])
+    for j in range(3):
+        s.w_fix_v_e_m_s[i, j] = v[j]
+
+
+@kernel
+def attach_others(row, s):  # type: ignore[no-untyped-def]
+    """Put magnetometer and air data of `row` beside the newest sample."""
+    i = (s.oldest + s.waiting - 1) % SIZE
+    if row.mag_new and s.use_magnetometer:
+        m = row.mag_b_ut
+        if abs(m[0]) < 1e4 and abs(m[1]) < 1e4 and abs(m[2]) < 1e4:
+            s.w_bits[i] |= HAS_MAG
+            for j in range(3):
+                s.w_mag_b_ut[i, j] = m[j]
+        else:
+            s.rejected += 1
+    if row.air_new and s.use_airspeed:
+        if 0.0 <= row.airspeed_m_s < 1000.0:
+            s.w_bits[i] |= HAS_AIR
+            s.w_airspeed_m_s[i] = row.airspeed_m_s
+        else:
+            s.rejected += 1
+
+
+# The present
+
+
+@kernel
+def turn_on(s, i):  # type: ignore[no-untyped-def]
+    """Turn the present attitude by waiting sample `i`."""
+    dt, gyro = s.w_dt_s[i], s.w_gyro[i]
+    turn_in_body(s.R_eb, dt * true_rate(gyro, s, 0), dt * true_rate(gyro, s, 1), dt * true_rate(gyro, s, 2))
+
+
+@kernel
+def reach_present(s):  # type: ignore[no-untyped-def]
+    """The filter's attitude turned on by all samples that wait."""
+    for i in range(3):
+        for j in range(3):
+            s.R_eb[i, j] = s.R_filter_eb[i, j]
+    for k in range(s.waiting):
+        turn_on(s, (s.oldest + k) % SIZE)
+
+
+@kernel
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One sample: see the module.
+
+    Parameters
+    ----------
+    rows : shape (N,), MEASURED   k : row of this tick   state : shape (1,), STATE_DTYPE, updated
+
+    Returns
+    -------
+    int    the `Health` of this tick's estimate
+    """
+    row, s = rows[k], state[0]
+    before = s.rejected
+    good = screen(row, s)
+    if good:
+        push(row, s, good)
+        if row.gps_new:
+            attach_fix(row, s)
+        attach_others(row, s)
+        turn_on(s, (s.oldest + s.waiting - 1) % SIZE)
+        corrected = False
+        while s.waiting > 0 and s.w_clock_s[s.oldest] <= s.clock_s - s.delay_s + 1e-9:
+            corrected |= advance_filter(s)
+        if corrected:
+            reach_present(s)
+        if not renormalise(s.R_eb):
+            level(s.R_eb)
+        s.wind_known = s.aligned and s.P[WIND_NE, WIND_NE] + s.P[WIND_NE + 1, WIND_NE + 1] < WIND_KNOWN_M_S**2
+    return health(s, s.rejected != before)
+
+
+@kernel
+def health(s, rejecting):  # type: ignore[no-untyped-def]
+    """What the filter says of itself."""
+    if not s.aligned:
+        return 0  # Health.STARTING
+    tilt = s.P[TILT, TILT] + s.P[TILT + 1, TILT + 1]
+    if rejecting or s.fix_age_s > FIX_LIFE_S or not tilt < GOOD_TILT_RAD**2:
+        return 2  # Health.POOR
+    return 1 if s.P[TILT + 2, TILT + 2] < GOOD_HEADING_RAD**2 else 0  # Health.GOOD
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+        write_wind(state[0], estimates[k])
+
+
+class InsEkf(Compiled):
+    """The inertial navigation filter; see the module.
+
+    Parameters
+    ----------
+    params : what it believes of its sensors; the defaults are the generic ones
+    """
+
+    heading_reference: HeadingReference = "nose"
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
+
+    def __init__(self, params: InsEkfParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or InsEkfParams()
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held), at rest, heading north.
+
+        Without a sample: a start in the air, level; velocity and heading from the first fix.
+        """
+        s = self._state[0]
+        self._state.fill(0)
+        for f in fields(self.params):
+            s[f.name] = getattr(self.params, f.name)
+        s["delay_s"] = self.params.gps_latency_s
+        s["lift_e_m_s2"] = -G_M_S2
+        s["R_eb"] = s["R_filter_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        if on_ground is None:
+            start_in_air(self._state)
+            return
+        s["gyro_bias_b_rad_s"] = offset_at_rest(on_ground)
+        start_at_rest(self._state, np.array(on_ground.force_b_m_s2, np.float64))
+
+    def sigma(self) -> dict[str, Array]:
+        """Standard deviations that the filter believes in, at its own time: a delay behind the present.
+
+        Returns
+        -------
+        dict    tilt_e_rad (3,), v_e_m_s (3,), gyro_bias_b_rad_s (3,), gyro_gain (3,), force_bias_b_m_s2 (3,),
+                lagged_v_e_m_s (3,), wind_e_m_s (2,)
+        """
+        sigmas = np.sqrt(np.diagonal(self._state["P"][0]))
+        parts = {
+            "tilt_e_rad": (TILT, 3), "v_e_m_s": (VEL, 3), "gyro_bias_b_rad_s": (BIAS, 3), "gyro_gain": (GAIN, 3),
+            "force_bias_b_m_s2": (FORCE, 3), "lagged_v_e_m_s": (LAG, 3), "wind_e_m_s": (WIND_NE, 2),
+        }  # fmt: skip
+        return {name: sigmas[first : first + count] for name, (first, count) in parts.items()}

@@ -1,0 +1,278 @@
+"""Starlino's complementary filter on the direction cosine matrix: a weighted mean of small rotations.
+
+Gyro, accelerometer and magnetometer each say by what small angle the earth has turned, seen from the body, since the
+last sample; the matrix turns by their weighted mean and is made orthonormal again.  No integral: what the gyro reads
+too much after the calibration at power-up is outweighed, never learnt.  No centrifugal force: the accelerometer is
+taken for the vertical, with less weight the further its length is from that of gravity.
+
+Frame
+-----
+The tutorial's earth is North-West-Up: the rows of its matrix are I (north), J (west) and K (zenith), seen from the
+body.  Inside this module that matrix is ``dcm``; it becomes ``R_eb``, north-east-down, in `to_north_east_down` and
+nowhere else.  Body axes need no conversion: the tutorial's are any right-handed three.  The accelerometer at rest
+points to the zenith where it is our specific force (K = f / g); the tutorial's output A has gravity's sign (K = -A).
+
+Errata
+------
+*Sign of the gyro* (Part 3 and Part 4; comments 36 and 37).  The tutorial takes the gyro's output for the rate at which
+the world turns about the device, and turns K by ``dtheta_g x K``.  A gyro measures the rate of the device; the world
+turns the other way.  As printed, the matrix turns backwards.  Starlino's own code has the minus sign: dtheta_g = -w dt.
+
+*Weights* (Part 4; comments 52, 115, 116).  ``(s_a a + s_g g + s_m m) / (s_a + s_g + s_m)`` also divides by the weights
+of instruments that see nothing of a rotation: an accelerometer nothing about K, a magnetometer nothing about I.  A
+turn about the vertical comes out short by s_a / (s_a + s_g), a twentieth.  The tutorial's note for advanced readers
+says what works, and it is done here for both: about each axis of the earth the mean goes over those that can tell.
+
+*West* (comments 16, 108).  ``W = A x M`` points west where A is the zenith, and east where A has gravity's sign;
+``N = W x A`` is north with either.
+
+What the tutorial leaves open
+-----------------------------
+Without a magnetometer the heading is that of the gyros.  (The tutorial's sample code then has a virtual one, "always
+pointing North": it pulls the nose to the north, whatever the aeroplane does, and is not for something that flies.)
+The weights count a sample: at another sample rate other weights are right.
+
+References
+----------
+Starlino, "DCM Tutorial - An Introduction to Orientation Kinematics", 2011, and its comments.
+"""
+
+import math
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimator.compiled import BELIEF, Compiled, write_estimate
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.jit import kernel
+from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
+from estimator.screening import (
+    FORCE_GOOD,
+    FORCE_RANGE_M_S2,
+    G_M_S2,
+    GYRO_RANGE_RAD_S,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    screen,
+    take_rate,
+)
+
+ZERO = (0.0, 0.0, 0.0)
+SMALL_RAD = 0.1  # "small": larger rotations are applied in parts
+SHORTEST_WEST = 0.02  # sine of the angle between field and vertical below which there is no north
+NED_FROM_NWU = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class StarlinoParams:
+    """Weights and what the sensors are.
+
+    s_g, s_a, s_m : float      weights of gyro, accelerometer and magnetometer, per sample.  The tutorial's author
+                               finds 20 and 1 good in most cases (comment 49) and gives no s_m; an error then goes
+                               with a time constant of (s_g + s_a) / s_a = 21 samples
+    band : float               the accelerometer's weight falls to zero, linearly, while its length is off that of
+                               gravity by this part of it (comment 28: 0.8 to 1.2 g); inf keeps its full weight
+    magnetometer : bool        9-DOF; without, or where no sample comes: 6-DOF
+    calibration                of the magnetometer
+    declination_rad : float    of magnetic from true north, positive east
+    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
+    """
+
+    s_g: float = 20.0
+    s_a: float = 1.0
+    s_m: float = 1.0
+    band: float = 0.2
+    magnetometer: bool = True
+    calibration: Calibration = field(default_factory=Calibration)
+    declination_rad: float = 0.0
+    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
+    force_range_m_s2: float = FORCE_RANGE_M_S2
+    field_range_ut: float = FIELD_RANGE_UT
+
+    def __post_init__(self) -> None:
+        for name in ("s_a", "s_m"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, zero or more")
+        for name in ("s_g", "gyro_range_rad_s", "force_range_m_s2", "field_range_ut"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, more than zero")
+        if not self.band > 0.0:
+            raise ValueError(f"band is {self.band}; it must be more than zero")
+        if not abs(self.declination_rad) <= math.pi:
+            raise ValueError(f"declination_rad is {self.declination_rad} rad; it must be -pi to pi")
+
+
+_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
+_OF_PARAMS = ("s_g", "s_a", "s_m", "band", "magnetometer")
+STATE_DTYPE = dtype_of(
+    (
+        *BELIEF,
+        *SCREEN,
+        *FIELD,
+        *(Column(name, (), "see StarlinoParams", integer=name == "magnetometer") for name in _OF_PARAMS),
+        Column("cos_declination", (), "of magnetic from true north"),
+        Column("sin_declination", (), "positive east"),
+        Column("dcm", (3, 3), "rows I, J, K: north, west and zenith, seen from the body"),
+    )
+)
+
+
+@kernel
+def dot(a, b):  # type: ignore[no-untyped-def]
+    """Of two tuples of three."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):  # type: ignore[no-untyped-def]
+    """Of two tuples of three, a tuple: nothing is allocated."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def plus(a, factor, b):  # type: ignore[no-untyped-def]
+    """``a + factor b``."""
+    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
+
+
+@kernel
+def normalize(a):  # type: ignore[no-untyped-def]
+    """``a / |a|``."""
+    return plus(ZERO, 1.0 / np.sqrt(dot(a, a)), a)
+
+
+@kernel
+def axis(m, i):  # type: ignore[no-untyped-def]
+    """Row `i` of a matrix."""
+    return m[i, 0], m[i, 1], m[i, 2]
+
+
+@kernel
+def trust(length_m_s2, band):  # type: ignore[no-untyped-def]
+    """Part of its weight that the accelerometer keeps: 1 at the length of gravity, 0 from `band` off it on."""
+    return max(0.0, 1.0 - abs(length_m_s2 / G_M_S2 - 1.0) / band)
+
+
+@kernel
+def north(A, s):  # type: ignore[no-untyped-def]
+    """North: the field made horizontal by the zenith `A` (comments 16, 108), a unit vector; and whether it is known."""
+    M = (s.field_b_ut[0], s.field_b_ut[1], s.field_b_ut[2])
+    W = cross(A, M)
+    horizontal2 = dot(W, W)
+    if not horizontal2 > SHORTEST_WEST**2 * dot(M, M):  # a field of no length is none either
+        return A, False
+    N = cross(W, A)  # magnetic: true north lies to the west of it by the declination
+    scale = 1.0 / np.sqrt(horizontal2)
+    return plus(plus(ZERO, scale * s.cos_declination, N), scale * s.sin_declination, W), True
+
+
+@kernel
+def displacement(row, s, good):  # type: ignore[no-untyped-def]
+    """The weighted mean d theta of what the instruments felt (Part 4), in body axes."""
+    I0, J0, K0 = axis(s.dcm, 0), axis(s.dcm, 1), axis(s.dcm, 2)
+    w, dt = s.omega_b_rad_s, s.dt_s
+    # What is summed about I, J and K: the earth turns against the gyro (comment 37).
+    g = (-dt * w[0], -dt * w[1], -dt * w[2])
+    i, j, k = s.s_g * dot(g, I0), s.s_g * dot(g, J0), s.s_g * dot(g, K0)
+    by_i = by_j = by_k = s.s_g
+    field_came = s.magnetometer and take_field(row, s)
+    f = row.force_b_m_s2
+    length = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+    part = trust(length, s.band) if good & FORCE_GOOD else 0.0
+    if part > 0.0 and length > 0.0:
+        A = (f[0] / length, f[1] / length, f[2] / length)  # K, as the accelerometer has it
+        a, s_a = cross(K0, A), part * s.s_a
+        i, j = i + s_a * dot(a, I0), j + s_a * dot(a, J0)
+        by_i, by_j = by_i + s_a, by_j + s_a
+        if field_came:
+            N, found = north(A, s)
+            if found:
+                m, s_m = cross(I0, N), part * s.s_m  # it leans on A, and is trusted as far as A is
+                j, k = j + s_m * dot(m, J0), k + s_m * dot(m, K0)
+                by_j, by_k = by_j + s_m, by_k + s_m
+    return plus(plus(plus(ZERO, i / by_i, I0), j / by_j, J0), k / by_k, K0)
+
+
+@kernel
+def orthonormalise(a, b):  # type: ignore[no-untyped-def]
+    """Two nearly orthogonal unit vectors, each moved by half of the error (Part 4, Scenario 3), and normalised.
+
+    Between vectors of unit length the cosine e becomes e^3 / 4.
+    """
+    err = 0.5 * dot(a, b)
+    return normalize(plus(a, -err, b)), normalize(plus(b, -err, a))
+
+
+@kernel
+def turn(dcm, d):  # type: ignore[no-untyped-def]
+    """Turn the matrix by the small rotation `d` of the earth, in place, as many small parts as it takes."""
+    parts = 1
+    if dot(d, d) > SMALL_RAD**2:
+        parts = 1 + int(np.sqrt(dot(d, d)) / SMALL_RAD)
+        d = plus(ZERO, 1.0 / parts, d)
+    I1, J1 = axis(dcm, 0), axis(dcm, 1)
+    for _ in range(parts):
+        I1, J1 = orthonormalise(plus(I1, 1.0, cross(d, I1)), plus(J1, 1.0, cross(d, J1)))
+    K1 = cross(I1, J1)
+    for i in range(3):
+        dcm[0, i], dcm[1, i], dcm[2, i] = I1[i], J1[i], K1[i]
+
+
+@kernel
+def to_north_east_down(s):  # type: ignore[no-untyped-def]
+    """Write the attitude that the rest of the world knows: east is not west, down is not up."""
+    for i in range(3):
+        s.R_eb[0, i], s.R_eb[1, i], s.R_eb[2, i] = s.dcm[0, i], -s.dcm[1, i], -s.dcm[2, i]
+
+
+@kernel
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One sample; returns the `Health`."""
+    row, s = rows[k], state[0]
+    before = s.rejected
+    good = screen(row, s)
+    if good:
+        take_rate(row, s, good)
+        turn(s.dcm, displacement(row, s, good))
+        to_north_east_down(s)
+    return 1 if s.rejected == before else 2  # Health.GOOD, Health.POOR
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+
+
+class Starlino(Compiled):
+    """The tutorial's filter in both its forms; see the module."""
+
+    heading_reference: HeadingReference = "nose"
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "magnetometer")
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
+
+    def __init__(self, params: StarlinoParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or StarlinoParams()
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: tilt and gyro offset from the mean sample of something at rest, heading north.
+
+        Without a sample, the tutorial's unit matrix, which corrects itself (comment 112).
+        """
+        s = self._state[0]
+        self._state.fill(0)
+        for name in (*_OF_PARAMS, *_RANGES):
+            s[name] = getattr(self.params, name)
+        for f in fields(Calibration):
+            s[f.name] = getattr(self.params.calibration, f.name)
+        d = self.params.declination_rad
+        s["cos_declination"], s["sin_declination"] = math.cos(d), math.sin(d)
+        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        s["dcm"] = NED_FROM_NWU @ s["R_eb"]
+        s["gyro_bias_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)

@@ -1,0 +1,112 @@
+"""A short flight on prescribed curves, as an autopilot would log it: each instrument at times of its own."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pymap3d
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from estimator.interface import MEASURED_DTYPE
+from scenarios.harness.logs.recorded import RecordedLog, Reference
+
+PLACE = 47.4, 8.5, 488.0
+FIELD_E_UT = np.array([21.5, 1.2, 43.0])
+
+
+@dataclass(frozen=True)
+class LoggedFlight:
+    """Inertial samples at 50 Hz, and what else was measured, at times (microseconds) between their ticks,
+    and those of the air on ticks.
+
+    Each of fix, field and air has ``_us`` shape (n,), and its values.
+    """
+
+    t_us: NDArray[Any]
+    rate: NDArray[Any]
+    force: NDArray[Any]
+    R_eb: NDArray[Any]
+    fix_us: NDArray[Any]
+    p_e: NDArray[Any]
+    v_e: NDArray[Any]
+    geodetic: NDArray[Any]
+    field_us: NDArray[Any]
+    field: NDArray[Any]
+    air_us: NDArray[Any]
+    airspeed: NDArray[Any]
+    height: NDArray[Any]
+
+    def expected(self) -> NDArray[Any]:
+        """The rows that a reader should make of it, filled by walking along it."""
+        rows = np.zeros(len(self.t_us), MEASURED_DTYPE)
+        rows["t_s"], rows["dt_s"] = self.t_us / 1e6, 0.02
+        rows["gyro_b_rad_s"], rows["force_b_m_s2"] = self.rate, self.force
+        rows["baro_height_m"] = np.nan
+        for k, t_us in enumerate(self.t_us):
+            for i in np.flatnonzero((self.fix_us > t_us - 20_000) & (self.fix_us <= t_us)):
+                n, e, _ = self.v_e[i]
+                rows["gps_new"][k], rows["gps_valid"][k:] = 1, 1
+                rows["gps_t_s"][k:] = self.fix_us[i] / 1e6
+                rows["gps_p_e_m"][k:], rows["gps_v_e_m_s"][k:] = self.p_e[i] - self.p_e[0], self.v_e[i]
+                rows["gps_course_rad"][k:], rows["gps_speed_m_s"][k:] = np.arctan2(e, n) % (2 * np.pi), np.hypot(n, e)
+            for i in np.flatnonzero((self.field_us > t_us - 20_000) & (self.field_us <= t_us)):
+                rows["mag_new"][k], rows["mag_b_ut"][k:] = 1, self.field[i]
+            for i in np.flatnonzero((self.air_us > t_us - 20_000) & (self.air_us <= t_us)):
+                rows["air_new"][k] = 1
+                rows["airspeed_m_s"][k:], rows["baro_height_m"][k:] = self.airspeed[i], self.height[i]
+        return rows
+
+    def log(self) -> RecordedLog:
+        """The same as a log, with the true attitude."""
+        instruments = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+        return RecordedLog(self.expected(), "expected", instruments, Reference(self.R_eb, "truth", "the curve"))
+
+
+@pytest.fixture(scope="session")
+def logged() -> LoggedFlight:
+    """20 s along sines, nose into the course and banking, from 30 s after power-up on."""
+    n, t0_us = 1000, 30_000_000
+    t_us = t0_us + 20_000 * np.arange(n + 1)
+    mean, amplitude = np.array([15.0, 5.0, 0.0]), np.array([40.0, 30.0, 5.0])
+    w, phase = np.array([0.25, 0.4, 0.6]), np.array([0.3, 0.0, 1.0])
+
+    def position(us: NDArray[Any]) -> NDArray[Any]:
+        t = us[:, None] / 1e6
+        return mean * t + amplitude * np.sin(w * t + phase)
+
+    def velocity(us: NDArray[Any]) -> NDArray[Any]:
+        return mean + amplitude * w * np.cos(w * us[:, None] / 1e6 + phase)
+
+    roll = 0.6 * np.sin(0.7 * t_us / 1e6)
+    v_n, v_e, v_d = velocity(t_us).T
+    R = Rotation.from_euler(
+        "ZYX", np.stack((np.arctan2(v_e, v_n), -np.arctan2(v_d, np.hypot(v_n, v_e)), roll), axis=-1)
+    )
+    rate = (R[:-1].inv() * R[1:]).as_rotvec() / 0.02  # the mean rate of an interval turns from tick to tick
+    acceleration = -amplitude * w**2 * np.sin(w * t_us[1:, None] / 1e6 + phase)
+    force = R[1:].inv().apply(acceleration - [0.0, 0.0, 9.80665])
+    fix_us, air_us = (
+        np.arange(t0_us + first, t_us[-1], every) for first, every in ((133_000, 200_000), (40_000, 100_000))
+    )
+    field_us = np.arange(t0_us + 81_000, t_us[-1], 100_000)
+    p_e = position(fix_us)
+    return LoggedFlight(
+        t_us[1:], rate, force, R[1:].as_matrix(),
+        fix_us, p_e, velocity(fix_us), np.column_stack(pymap3d.ned2geodetic(*(p_e - p_e[0]).T, *PLACE)),
+        field_us, R[(field_us - t0_us) // 20_000].inv().apply(FIELD_E_UT),
+        air_us, np.linalg.norm(velocity(air_us), axis=1) - 2.0, 60.0 - position(air_us)[:, 2],
+    )  # fmt: skip
+
+
+def same_rows(found: NDArray[Any], expected: NDArray[Any], tolerance: dict[str, float]) -> None:
+    """Demand every column equal, within `tolerance` (or 1e-9) absolutely, flags exactly."""
+    for name in MEASURED_DTYPE.names:
+        np.testing.assert_allclose(found[name], expected[name], rtol=0, atol=tolerance.get(name, 1e-9), err_msg=name)
+
+
+@pytest.fixture(scope="session")
+def demand_same_rows() -> Any:
+    """`same_rows`, for tests."""
+    return same_rows
