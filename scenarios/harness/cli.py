@@ -30,9 +30,11 @@ from scenarios.harness.cli_options import (
     ImuRateOption,
     JsonOption,
     MarkdownOption,
+    ParameterOption,
     ReferenceOption,
     SensorsOption,
     SetOption,
+    SeveralOption,
     ShearOption,
     ThermalsOption,
     TurbulenceOption,
@@ -204,9 +206,7 @@ def check(
 @app.command()
 def compare(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
-    estimators: Annotated[
-        str | None, typer.Option("--estimators", metavar="A,B,C", help="What flies it; all there are by default.")
-    ] = None,
+    estimators: SeveralOption = None,
     seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds that each of them flies: 0-9 or 0,2,5-7.")] = "0-9",
     wind: WindOption = None,
     shear: ShearOption = None,
@@ -261,9 +261,7 @@ def replay(
     reference: ReferenceOption = None,
     columns: ColumnsOption = None,
     imu: UnitOption = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
-    ] = None,
+    set_: ParameterOption = None,
     calibration: CalibrationOption = None,
     airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
     settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,

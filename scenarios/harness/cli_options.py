@@ -76,3 +76,9 @@ UnitOption = Annotated[
     int | None,
     typer.Option("--imu", min=0, metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0."),
 ]
+SeveralOption = Annotated[
+    str | None, typer.Option("--estimators", metavar="A,B,C", help="What flies it; all there are by default.")
+]
+ParameterOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+]
