@@ -29,6 +29,7 @@ from scenarios.harness.cli_options import (
     GustOption,
     ImuRateOption,
     JsonOption,
+    LogEstimatorsOption,
     MarkdownOption,
     ParameterOption,
     ReferenceOption,
@@ -231,16 +232,15 @@ def compare(
 
     with _reporting(json_) as report:
         with usage():
-            for path in (picture, markdown):
-                _check_file(path)
+            _check_file(picture)
+            _check_file(markdown)
             handbook.check_picture(picture)
-            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
-            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
-            names = [name.strip() for name in (estimators or "").split(",") if name.strip()]
-            flown = comparing.prepare(scenario, names, gate.parse_seeds(seeds), changes)
+            fitted = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
+            changes = _changes(set_) | fitted | _air(wind, shear, gust, turbulence, thermals)
+            plan = comparing.prepare(scenario, _names(estimators), gate.parse_seeds(seeds), changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
-                compared = comparing.fly(flown, workers or _processors(), advance)
+                compared = comparing.fly(plan, workers or _processors(), advance)
         if picture is not None:
             from scenarios.harness import compare_picture
 
@@ -255,9 +255,7 @@ def compare(
 @app.command()
 def replay(
     log: Annotated[Path, typer.Argument(help="Recording of ours, .csv, .mat, .bin, .ulg, or reference vectors.")],
-    estimator: Annotated[
-        str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
-    ] = "premerlani",
+    estimator: LogEstimatorsOption = "premerlani",
     reference: ReferenceOption = None,
     columns: ColumnsOption = None,
     imu: UnitOption = None,
@@ -277,7 +275,7 @@ def replay(
         with usage():
             told = replaying.run(
                 log,
-                [name.strip() for name in estimator.split(",") if name.strip()],
+                _names(estimator),
                 out,
                 reference=reference,
                 columns=columns,
@@ -442,6 +440,10 @@ def _air(
     """Overrides of the options about the air."""
     named = {"wind": wind, "air.shear": shear, "air.gusts": gust or None}
     return _given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
+
+
+def _names(text: str | None) -> list[str]:
+    return [name.strip() for name in (text or "").split(",") if name.strip()]
 
 
 def _processors() -> int:

@@ -82,3 +82,6 @@ SeveralOption = Annotated[
 ParameterOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
 ]
+LogEstimatorsOption = Annotated[
+    str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
+]
