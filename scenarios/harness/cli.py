@@ -193,7 +193,7 @@ def check(
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
-                verdict, whole = gate.fly_all(tasks, workers or _processors(), advance)
+                verdict, whole = gate.fly_all(tasks, workers or gate.processors(), advance)
         if whole:
             _write(junit, verdict.to_junit)
             _write(markdown, verdict.to_markdown)
@@ -240,7 +240,7 @@ def compare(
             plan = comparing.prepare(scenario, _names(estimators), gate.parse_seeds(seeds), changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
-                compared = comparing.fly(plan, workers or _processors(), advance)
+                compared = comparing.fly(plan, workers or gate.processors(), advance)
         if picture is not None:
             from scenarios.harness import compare_picture
 
@@ -444,10 +444,6 @@ def _air(
 
 def _names(text: str | None) -> list[str]:
     return [name.strip() for name in (text or "").split(",") if name.strip()]
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager
