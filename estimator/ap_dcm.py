@@ -489,7 +489,7 @@ class ApDcm(Compiled):
 
 
 class ApDcm2013(ApDcm):
-    """The original of 12 July 2013: `ApDcm` with all quirks."""
+    """The original of 12 July 2013: `ApDcm` with all quirks, unless `params` say otherwise."""
 
-    def __init__(self) -> None:
-        super().__init__(ApDcmParams(quirks=JULY_2013))
+    def __init__(self, params: ApDcmParams | None = None) -> None:
+        super().__init__(params or ApDcmParams(quirks=JULY_2013))

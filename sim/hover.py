@@ -31,7 +31,7 @@ class Hover:
     north: Sines = ((0.40, 0.11, 0.0), (0.15, 0.31, 1.0))
     east: Sines = ((0.35, 0.09, 2.0), (0.15, 0.27, 3.0))
     yaw: Sines = ((math.radians(4.0), 0.05, 4.0), (math.radians(1.5), 0.17, 5.0))
-    rotor_rpm: float = 6000.0
+    rotor_rpm: float = 5500.0  # held exactly, a multiple of the sample rate would fold down to a constant force
     height_m: float = 5.0
     phase: ClassVar[Phase] = Phase.FLYING
     wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM

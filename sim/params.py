@@ -50,7 +50,8 @@ def words_of(name: str) -> str:
 def near_misses(name: str, names: Iterable[str]) -> str:
     """The end of a message about an unknown `name`: what it may have meant, or all there is."""
     possible = sorted(names)
-    close = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
+    slips = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.85)  # a key or two: nothing else is meant
+    close = slips or difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
 
 

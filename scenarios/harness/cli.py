@@ -29,13 +29,17 @@ from scenarios.harness.cli_options import (
     GustOption,
     ImuRateOption,
     JsonOption,
+    LogEstimatorsOption,
     MarkdownOption,
+    ParameterOption,
     ReferenceOption,
     SensorsOption,
     SetOption,
+    SeveralOption,
     ShearOption,
     ThermalsOption,
     TurbulenceOption,
+    UnitOption,
     WebOption,
     WindOption,
     WorkersOption,
@@ -189,7 +193,7 @@ def check(
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
-                verdict, whole = gate.fly_all(tasks, workers or _processors(), advance)
+                verdict, whole = gate.fly_all(tasks, workers or gate.processors(), advance)
         if whole:
             _write(junit, verdict.to_junit)
             _write(markdown, verdict.to_markdown)
@@ -203,9 +207,7 @@ def check(
 @app.command()
 def compare(
     scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
-    estimators: Annotated[
-        str | None, typer.Option("--estimators", metavar="A,B,C", help="What flies it; all there are by default.")
-    ] = None,
+    estimators: SeveralOption = None,
     seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds that each of them flies: 0-9 or 0,2,5-7.")] = "0-9",
     wind: WindOption = None,
     shear: ShearOption = None,
@@ -230,16 +232,15 @@ def compare(
 
     with _reporting(json_) as report:
         with usage():
-            for path in (picture, markdown):
-                _check_file(path)
+            _check_file(picture)
+            _check_file(markdown)
             handbook.check_picture(picture)
-            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
-            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
-            names = [name.strip() for name in (estimators or "").split(",") if name.strip()]
-            flown = comparing.prepare(scenario, names, gate.parse_seeds(seeds), changes)
+            fitted = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
+            changes = _changes(set_) | fitted | _air(wind, shear, gust, turbulence, thermals)
+            plan = comparing.prepare(scenario, _names(estimators), gate.parse_seeds(seeds), changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
-                compared = comparing.fly(flown, workers or _processors(), advance)
+                compared = comparing.fly(plan, workers or gate.processors(), advance)
         if picture is not None:
             from scenarios.harness import compare_picture
 
@@ -254,17 +255,11 @@ def compare(
 @app.command()
 def replay(
     log: Annotated[Path, typer.Argument(help="Recording of ours, .csv, .mat, .bin, .ulg, or reference vectors.")],
-    estimator: Annotated[
-        str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
-    ] = "premerlani",
+    estimator: LogEstimatorsOption = "premerlani",
     reference: ReferenceOption = None,
     columns: ColumnsOption = None,
-    imu: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
-    ] = None,
+    imu: UnitOption = None,
+    set_: ParameterOption = None,
     calibration: CalibrationOption = None,
     airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
     settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,
@@ -280,7 +275,7 @@ def replay(
         with usage():
             told = replaying.run(
                 log,
-                [name.strip() for name in estimator.split(",") if name.strip()],
+                _names(estimator),
                 out,
                 reference=reference,
                 columns=columns,
@@ -448,8 +443,8 @@ def _air(
     return _given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
 
 
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def _names(text: str | None) -> list[str]:
+    return [name.strip() for name in (text or "").split(",") if name.strip()]
 
 
 @contextmanager

@@ -72,3 +72,16 @@ ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column m
 ReferenceOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
 ]
+UnitOption = Annotated[
+    int | None,
+    typer.Option("--imu", min=0, metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0."),
+]
+SeveralOption = Annotated[
+    str | None, typer.Option("--estimators", metavar="A,B,C", help="What flies it; all there are by default.")
+]
+ParameterOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+]
+LogEstimatorsOption = Annotated[
+    str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
+]

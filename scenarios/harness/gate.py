@@ -5,6 +5,7 @@ in which the flights were named, so neither the number of workers nor their spee
 """
 
 import multiprocessing
+import os
 import re
 import signal
 import sys
@@ -171,6 +172,11 @@ def _fly_over_processes(tasks: Sequence[Flyable[_Result]], workers: int, keep: C
             raise WorkerDied(f"a worker process died with {len(waiting)} flights to go; try fewer --workers") from error
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+def processors() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _set_up_worker() -> None:

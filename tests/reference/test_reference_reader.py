@@ -8,6 +8,7 @@ import pytest
 
 from scenarios.harness.logs import reference
 from scenarios.harness.logs.recorded import LogError
+from scenarios.harness.replay import replay
 
 DATA = Path(__file__).parent / "data"
 SETS = {"A50": ("ap_ahrs_dcm", 50), "C50": ("ap_ahrs_dcm", 50), "C40": ("matrixpilot", 40)}
@@ -74,3 +75,20 @@ def test_truncated_file_is_refused(tmp_path):
     path.write_bytes((DATA / "ap_ahrs_dcm" / "A50_in.csv.gz").read_bytes()[:5000])
     with pytest.raises(LogError, match="cannot be read"):
         reference.read(path)
+
+
+@pytest.mark.parametrize(
+    ("estimator", "path", "output", "rms_deg", "max_deg"),
+    [
+        ("ap_dcm", "ap_ahrs_dcm/E100", "ap2013_mag_nogps_copter", 0.01, 0.05),
+        ("ap_dcm", "ap_ahrs_dcm/A50", "ap2013_mag", 0.05, 0.15),
+        ("ap_dcm_2013", "ap_ahrs_dcm/C50", "ap2013_gps", 0.2, 0.4),
+        ("matrixpilot", "matrixpilot/C40", "mp_gpscent", 2.0, 6.0),
+    ],
+)
+def test_replay_against_firmware_is_set_as_that_firmware(estimator, path, output, rms_deg, max_deg):
+    """Named on the command line without any setting, an estimator follows the output of its original."""
+    log = reference.read(DATA / f"{path}_in.csv.gz", DATA / f"{path}_{output}.csv.gz")
+    score = replay(log, estimator).to_json()
+    assert score["rotation_rms_deg"] <= rms_deg
+    assert score["rotation_max_deg"] <= max_deg
