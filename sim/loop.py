@@ -17,6 +17,7 @@ from sim.events import events_of
 from sim.log import Flight, Log, Outcome
 from sim.oracle import Oracle
 from sim.plant import Plant, SimulationDiverged
+from sim.power_up import mean_sample
 from sim.sensors.suite import Suite
 
 Watch = Callable[[Log, int], None]  # shown the log and the number of its rows that are filled
@@ -31,6 +32,7 @@ def fly(
     log: Log,
     *,
     calibration_s: float = 0.0,
+    on_ground: ImuSample | None = None,
     manifest: dict[str, Any] | None = None,
     watch: Watch | None = None,
 ) -> Flight:
@@ -40,7 +42,8 @@ def fly(
     ----------
     script          set-points by time since the release
     calibration_s   time after power-up over which the inertial samples are averaged for ``estimator.reset``;
-                    0 where the flight starts in the air, which is ``reset(None)``
+                    0 where the flight starts in the air
+    on_ground       what ``estimator.reset`` is given then: a mean sample from before the flight, or None
     manifest        seed, resolved configuration, versions: goes into the recording
     watch           called once a simulated second with the log and the number of rows filled so far
     """
@@ -63,7 +66,7 @@ def fly(
                 record_command(log.flown, k, command)
                 continue
             if k == n_calibration:
-                power_up(estimator, log, n_calibration)
+                power_up(estimator, mean_sample(log.measured[:k]) if k else on_ground)
             setpoint = script.at(k * plant.dt_s + to_release_s)
             estimate = estimate_of(estimator, measured, log.flown, k)
             command = command_of(autopilot, estimate, measured, setpoint, log.flown, k)
@@ -92,14 +95,9 @@ def make_ready(estimator: AttitudeEstimator, autopilot: Autopilot, log: Log) -> 
             autopilot.reset()
 
 
-def power_up(estimator: AttitudeEstimator, log: Log, n_ticks: int) -> None:
-    """Switch the estimator on with the mean inertial sample of the first `n_ticks`, or None where there are none."""
+def power_up(estimator: AttitudeEstimator, on_ground: ImuSample | None) -> None:
+    """Switch the estimator on with the mean inertial sample `on_ground`, or None where there is none."""
     if not hasattr(estimator, "reset"):
         return
-    on_ground = None
-    if n_ticks:
-        rows = log.measured[:n_ticks]
-        gyro, force = rows["gyro_b_rad_s"].mean(axis=0), rows["force_b_m_s2"].mean(axis=0)
-        on_ground = ImuSample(float(rows["t_s"][-1]), float(rows["dt_s"].sum()), gyro, force)
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, on_ground.t_s if on_ground else 0.0):
         estimator.reset(on_ground)

@@ -117,7 +117,7 @@ class Cruise:
         estimator = load_estimator(self.spec)
         autopilot = load_autopilot("dcm", heading_reference_of(estimator))
         make_ready(estimator, autopilot, self.log)
-        power_up(estimator, self.log, 0)
+        power_up(estimator, None)
         return estimator, autopilot
 
     def closed_us(self) -> float:

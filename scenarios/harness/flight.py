@@ -18,6 +18,7 @@ from sim.log import Flight, Log
 from sim.loop import Watch, fly
 from sim.params import changed
 from sim.plant import HandThrow, InFlight, Start
+from sim.power_up import sample_at_rest
 from sim.sensors.suite import Suite
 
 Maker = Callable[[], AttitudeEstimator]
@@ -79,6 +80,7 @@ def fly_config(
     )
     faults = [parse_fault(fault) for fault in config.faults]
     sensors = suite_params(config.suite, config.sensors, config.files)
+    calibration_s = config.start.calibration_s if isinstance(config.start, HandThrowStart) else 0.0
     flown = fly(
         plant,
         Suite(sensors, rates, config.seed, config.flight, faults, plant.release_s),
@@ -86,7 +88,8 @@ def fly_config(
         pilot,
         script,
         Log.empty(rates.ticks(plant.release_s + config.duration_s)),
-        calibration_s=config.start.calibration_s if isinstance(config.start, HandThrowStart) else 0.0,
+        calibration_s=calibration_s,
+        on_ground=None if calibration_s else sample_at_rest(sensors, rates, config.seed, config.flight),
         manifest={"scenario": scenario.name, "seed": config.seed, "config": config.model_dump(mode="json")},
         watch=watch,
     )

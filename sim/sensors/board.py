@@ -26,6 +26,8 @@ class BoardParams:
     supply_tolerance : sigma of the supply voltage's relative error, constant in a flight
     supply_sag : relative fall of the supply at full throttle
     converter_ratiometric : the converter measures in units of the supply; otherwise of a reference of its own
+    rest_s : how long the firmware averages the sensors, level on the ground, before a flight that starts in the air
+    (a throw is calibrated in the hand); 0 is not at all
     warming_k : how much warmer the parts are in the end than at power-up      warming_s : time constant of that
     vibration_g, vibration_deg_s : amplitude of each axis at the motor speed `vibration_rpm`, once per
     revolution; it grows with the square of the speed (a rotor out of balance)
@@ -36,6 +38,7 @@ class BoardParams:
     supply_tolerance: float = 0.0
     supply_sag: float = 0.0
     converter_ratiometric: bool = True
+    rest_s: float = 0.0
     warming_k: float = 0.0
     warming_s: float = 300.0
     vibration_g: float = 0.0
@@ -52,6 +55,7 @@ class BoardParams:
             if len(value) != 3 or not all(map(math.isfinite, value)):
                 raise ValueError(f"BoardParams.{name} = {value!r} {unit}: choose three finite numbers")
         require(self, "K", "warming_k")
+        require(self, "s", "rest_s")
         require(self, "s", "warming_s", least=0.001)
         require(self, "g", "vibration_g")
         require(self, "deg/s", "vibration_deg_s")
