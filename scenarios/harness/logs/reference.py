@@ -4,11 +4,15 @@ The input has a row per inertial sample in SI units, earth north-east-down, body
 of the interval, its length, mean rate and specific force, GPS velocity and position where a fix arrived, magnetic
 field in counts where a sample arrived, airspeed.  The attitudes (``*_truth``, or what the original firmware printed)
 are the nine elements of the body-to-earth rotation, row by row.
+
+What the input was made with, and how an original was set for the output that it is compared with, is known by the
+names of the files, and goes to the estimators that have such a parameter (`RecordedLog.suits`).
 """
 
 import csv
 import gzip
 import io
+import math
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +26,22 @@ COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about 
 LEAST_FIX = 3  # a fix of three dimensions
 INPUT = ("t", "dt", "gx", "gy", "gz", "ax", "ay", "az", "gps_new", "gps_vn", "gps_ve", "gps_vd", "gps_fix",
          "mag_new", "mx", "my", "mz", "airspeed", "gps_n", "gps_e", "gps_d")  # fmt: skip
+SUITS = {  # by the name of the set: its receiver does not filter, but it may be late; E100 has none
+    "A50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.0},
+    "C50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.4},
+    "C40": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.25},
+}
+SETTINGS = {  # of the originals, by the end of the name of their output
+    "_ap2013_gps": {"use_compass": 0.0},
+    "_ap2013_mag_nogps_copter": {"fly_forward": 0.0},
+    "_mp_gpscent": {"centrifugal_from_gps": 1.0, "keep_tilt": 0.0},
+}
+AP2013_STEPS = {  # that original got whole centimetres a second, hundredths of a degree, and counts
+    "gps_v_e_m_s": 0.01,
+    "gps_speed_m_s": 0.01,
+    "gps_course_rad": math.radians(0.01),
+    "mag_b_ut": COUNT_UT,
+}
 ATTITUDE = ("t", *(f"r{i}{j}" for i in range(3) for j in range(3)))
 
 
@@ -59,7 +79,20 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     instruments = ["gyro", "accelerometer"]
     instruments += [name for name, has in (("gps", fixes), ("magnetometer", rows["mag_new"])) if np.any(has)]
     instruments += ["airspeed"] if flown_through_air else []
-    return RecordedLog(rows, path.name, tuple(instruments), _reference(path, reference, table["t"]))
+    attitudes = _reference(path, reference, table["t"])
+    if attitudes is not None and "_ap2013_" in attitudes.name:
+        for column, step in AP2013_STEPS.items():
+            rows[column] = step * np.rint(rows[column] / step)
+    return RecordedLog(rows, path.name, tuple(instruments), attitudes, suits=_suits(path, attitudes))
+
+
+def _suits(path: Path, attitudes: Reference | None) -> dict[str, float]:
+    """What is known of the set of `path`, and of the original that printed the `attitudes`."""
+    suits = dict(SUITS.get(path.name.partition("_")[0], {}))
+    for end, settings in SETTINGS.items():
+        if attitudes is not None and attitudes.name.endswith(end):
+            suits |= settings
+    return suits
 
 
 def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | None:
@@ -87,13 +120,23 @@ def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
     missing = [name for name in wanted if name not in header]
     if missing:
         raise LogError(f"{path}: no column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
-    try:
-        values = np.array([[float(cell) for cell in line] for line in lines], dtype=float)
-    except ValueError as error:
-        raise LogError(f"{path}: row {lines.line_num}: {error}") from error
-    if values.ndim != 2 or values.shape[1] != len(header):
-        raise LogError(f"{path}: {len(values)} rows; each must have the {len(header)} numbers of the header")
+    rows = []
+    for line in lines:
+        if len(line) != len(header):
+            raise LogError(f"{path}: line {lines.line_num}: {len(line)} cells; the header has {len(header)}")
+        where = f"{path}: line {lines.line_num}, column"
+        rows.append([_number(cell, where, name) for name, cell in zip(header, line, strict=True)])
+    if not rows:
+        raise LogError(f"{path}: no row of numbers")
+    values = np.array(rows)
     return {name: values[:, header.index(name)] for name in wanted}
+
+
+def _number(cell: str, where: str, name: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise LogError(f"{where} {name}: {cell!r} is no number") from None
 
 
 def _vector(table: dict[str, Array], *names: str) -> Array:
