@@ -464,10 +464,11 @@ class ApDcm(Compiled):
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     _step: ClassVar[Any] = staticmethod(step)
     _replay: ClassVar[Any] = staticmethod(_replay)
+    _default: ClassVar[ApDcmParams] = ApDcmParams()
 
     def __init__(self, params: ApDcmParams | None = None) -> None:
         super().__init__(STATE_DTYPE)
-        self.params = params or ApDcmParams()
+        self.params = params or self._default
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:
@@ -489,7 +490,6 @@ class ApDcm(Compiled):
 
 
 class ApDcm2013(ApDcm):
-    """The original of 12 July 2013: `ApDcm` with all quirks, unless `params` say otherwise."""
+    """The original of 12 July 2013: `ApDcm` with all quirks."""
 
-    def __init__(self, params: ApDcmParams | None = None) -> None:
-        super().__init__(params or ApDcmParams(quirks=JULY_2013))
+    _default = ApDcmParams(quirks=JULY_2013)

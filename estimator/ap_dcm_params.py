@@ -13,7 +13,7 @@ class Quirk(StrEnum):
     """Something the original did and the mended algorithm does not; the value is its name in settings and state."""
 
     UNWRAPPED_COURSE = "unwrapped_course"
-    """The course is 0..2 pi and the yaw -pi..pi, their difference is not wrapped: on courses of 180 to 300 degrees
+    """The course is 0..2 pi and the yaw -pi..pi, their difference is not wrapped: on courses of 180 to 360 degrees
     heading is set to the course at every fix instead of being corrected."""
     STALE_EULER = "stale_euler"
     """Roll, pitch and yaw, where angles are used, are those of the sample before: setting the heading to the course
@@ -42,7 +42,8 @@ JULY_2013: frozenset[Quirk] = frozenset(Quirk)
 class ApDcmParams:
     """Settings; the defaults of gains and limits are those of 2013.
 
-    quirks : frozenset of Quirk   what of the original is not mended
+    quirks : frozenset of Quirk   what of the original is not mended; also as a text, names with commas between or
+                                ``JULY_2013`` for all of them
     kp, ki : float              roll-pitch gains, 1/s and 1/s^2 per unit of (sine) error; ArduPilot's AHRS_RP_P.
                                 Large: errors go quickly, but accelerations and wind get in
     kp_yaw, ki_yaw : float      the same for yaw; AHRS_YAW_P
@@ -73,6 +74,9 @@ class ApDcmParams:
     force_range_m_s2: float = FORCE_RANGE_M_S2
 
     def __post_init__(self) -> None:
+        if isinstance(self.quirks, str):  # as it is typed: --set quirks=vertical_clip,stuck_p_gain
+            names = frozenset(filter(None, (name.strip() for name in self.quirks.split(","))))
+            object.__setattr__(self, "quirks", JULY_2013 if names == {"JULY_2013"} else names)
         unknown = sorted(set(self.quirks) - JULY_2013)
         if unknown:
             raise ValueError(f"quirks has {unknown[0]!r}; there are {', '.join(sorted(JULY_2013))}")

@@ -129,10 +129,6 @@ def typed(value: Any, hint: Any) -> Any:
         return value
     if origin is tuple:
         return _numbers(value, get_args(hint))
-    if origin is frozenset:
-        if not isinstance(value, str | list | tuple | set | frozenset):
-            raise ValueError("must be names with commas between them")
-        return frozenset(value.replace(",", " ").split() if isinstance(value, str) else value)
     if hint is bool:
         if value not in (True, False):
             raise ValueError("must be true or false")

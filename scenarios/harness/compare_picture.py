@@ -114,7 +114,8 @@ def _over_time(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) ->
     floor = max(LEAST_DEG, 0.7 * min(float(line.get_ydata().min()) for line in ax.lines))
     ax.set(yscale="log", ylim=(floor, 1.6 * top), xlabel="time since the release, s", ylabel="inclination error, deg")
     ax.set_title("Inclination error over time", pad=15)
-    shade = "" if many else "shade: the middle half     "
+    shaded = not many and any(len(e.flights) > 2 for e in entrants)
+    shade = "shade: the middle half     " if shaded else ""
     note = f"line: median of the seeds, RMS of every {bin_s:g} s     {shade}cross: a flight that ended early"
     ax.text(0.0, 1.012, note, transform=ax.transAxes, fontsize=7.8, color=FAINT)
     ax.margins(x=0.01)

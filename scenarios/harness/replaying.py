@@ -158,6 +158,4 @@ def _free_folder(into: Path, name: str) -> Path:
 
 def _short(value: Any) -> str:
     """A parameter in a few letters."""
-    if isinstance(value, list):
-        return "+".join(map(str, value))
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+    return value if isinstance(value, str) else f"{value:g}"

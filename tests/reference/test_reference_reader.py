@@ -55,8 +55,9 @@ def test_output_of_the_firmware_can_be_the_reference():
     ("text", "said"),
     [
         ("t,dt\n1,2\n", "no column gx, gy, gz"),
-        (",".join(reference.INPUT) + "\n" + "1," * 20 + "x\n", r"row 2: could not convert string to float: 'x'"),
-        (",".join(reference.INPUT) + "\n", "0 rows; each must have the 21 numbers"),
+        (",".join(reference.INPUT) + "\n" + "1," * 20 + "x\n", "line 2, column gps_d: 'x' is no number"),
+        (",".join(reference.INPUT) + "\n1,2\n", "line 2: 2 cells; the header has 21"),
+        (",".join(reference.INPUT) + "\n", "no row of numbers"),
     ],
 )
 def test_broken_input_is_refused_with_its_row_and_column(tmp_path, text, said):
@@ -92,3 +93,16 @@ def test_replay_against_firmware_is_set_as_that_firmware(estimator, path, output
     score = replay(log, estimator).to_json()
     assert score["rotation_rms_deg"] <= rms_deg
     assert score["rotation_max_deg"] <= max_deg
+
+
+def test_log_knows_its_receiver_and_how_the_original_was_set():
+    """By the names of the files; the input is rounded as the original of 2013 got it, and for that alone."""
+    folder = DATA / "ap_ahrs_dcm"
+    truth = reference.read(folder / "C50_in.csv.gz")
+    assert truth.suits == {"declination_rad": np.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.4}
+    original = reference.read(folder / "C50_in.csv.gz", folder / "C50_ap2013_gps.csv.gz")
+    assert original.suits == {**truth.suits, "quirks": "JULY_2013", "use_compass": 0.0}
+    cm_s = 100.0 * original.rows["gps_v_e_m_s"]
+    np.testing.assert_allclose(cm_s, np.rint(cm_s), rtol=0, atol=1e-9)
+    assert not np.allclose(100.0 * truth.rows["gps_v_e_m_s"], np.rint(cm_s), rtol=0, atol=0.1)
+    assert np.abs(original.rows["mag_b_ut"] - truth.rows["mag_b_ut"]).max() <= 0.5 * reference.COUNT_UT + 1e-9

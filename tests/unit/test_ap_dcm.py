@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.ap_dcm import JULY_2013, STATE_DTYPE, ApDcm, ApDcmParams, Quirk, spin_gain
+from estimator.ap_dcm import JULY_2013, STATE_DTYPE, ApDcm, ApDcm2013, ApDcmParams, Quirk, spin_gain
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
+from scenarios.harness.replay import make
 
 G_M_S2 = 9.80665
 DECLINATION_RAD = math.radians(8.0)
@@ -251,9 +252,20 @@ def test_lost_samples_of_the_accelerometer_do_not_tilt():
     assert tilt[1500:].max() < 1.0
 
 
+def test_quirks_can_be_typed_and_the_original_takes_settings():
+    """As on the command line, ``--set quirks=...``; what `ap_dcm_2013` is told nothing of stays as it was."""
+    assert ApDcmParams(quirks="vertical_clip, stuck_p_gain").quirks == {Quirk.VERTICAL_CLIP, Quirk.STUCK_P_GAIN}
+    assert ApDcmParams(quirks="JULY_2013").quirks == JULY_2013
+    assert ApDcmParams(quirks="").quirks == frozenset()
+    assert ApDcm2013().params == ApDcmParams(quirks=JULY_2013)
+    assert make("ap_dcm_2013", {"kp": "0.2"}).params == ApDcmParams(quirks=JULY_2013, kp=0.2)
+    assert make("ap_dcm", {"quirks": "vertical_clip"}).params.quirks == {Quirk.VERTICAL_CLIP}
+
+
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
+        ({"quirks": "vertical_clip,typo"}, "quirks has 'typo'"),
         ({"quirks": frozenset({"typo"})}, "quirks has 'typo'; there are compass_is_no_yaw, "),
         ({"kp": -0.1}, "kp is -0.1; it must be a finite number, zero or more"),
         ({"ki_yaw": math.inf}, "ki_yaw is inf"),

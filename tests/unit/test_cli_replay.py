@@ -72,6 +72,31 @@ def test_replay_of_reference_vectors_counts_every_row_against_firmware(tmp_path:
     assert data["judged_s"] == pytest.approx(130.0, rel=0, abs=1e-6)
 
 
+# Asked for: 0.01 / 0.05 on E100, 0.05 / 0.15 on A50, 0.2 / 0.4 on C50 gps; for MatrixPilot 2 / 6.
+@pytest.mark.parametrize(
+    ("folder", "output", "estimator", "rms_deg", "max_deg"),
+    [
+        ("ap_ahrs_dcm", "E100_ap2013_mag_nogps_copter", "ap_dcm_2013", 0.005, 0.02),
+        ("ap_ahrs_dcm", "A50_ap2013_gps", "ap_dcm_2013", 0.001, 0.002),
+        ("ap_ahrs_dcm", "A50_ap2013_mag", "ap_dcm_2013", 0.001, 0.002),
+        ("ap_ahrs_dcm", "C50_ap2013_gps", "ap_dcm_2013", 0.001, 0.002),
+        ("matrixpilot", "C40_mp_udb4", "matrixpilot", 2.0, 6.0),
+        ("matrixpilot", "C40_mp_gpscent", "matrixpilot", 2.0, 5.0),
+    ],
+)
+def test_replay_against_an_original_is_set_as_the_original_was(
+    tmp_path: Path, capfd, folder: str, output: str, estimator: str, rms_deg: float, max_deg: float
+) -> None:
+    """Without a setting on the command line: the names of the files tell how the original was set."""
+    vectors = DATA.parent / folder
+    command = ["replay", str(vectors / f"{output.partition('_')[0]}_in.csv.gz"), "--estimator", estimator]
+    files = ["--reference", str(vectors / f"{output}.csv.gz"), "--out", str(tmp_path), "--no-rerun", "--json", "-"]
+    assert run([*command, *files]) == 0
+    data = json.loads(capfd.readouterr().out)
+    assert data["rotation_rms_deg"] <= rms_deg
+    assert data["rotation_max_deg"] <= max_deg
+
+
 def test_replay_of_a_table_by_a_column_map_with_parameters(here: Path, capfd) -> None:
     """The flight as text in degrees and milliseconds gives the same scores; a parameter gives others."""
     log = recording.load(here / "flown" / "turns_180-premerlani-seed1").log

@@ -85,6 +85,12 @@ def test_times_in_disorder_are_sorted_with_what_they_carry(log):
     assert found.repairs == ("column time: 1 out of order, sorted; first row 102",)
 
 
+def test_log_that_runs_back_step_by_step_is_refused(log):
+    """Late is what is behind the latest row so far by more than a second, however small the steps back."""
+    with pytest.raises(LogError, match=r"row 52, column time: runs back from 8 to 6\.98 s"):
+        mended(replace(log, rows=log.rows[::-1], reference=None), HERE)
+
+
 def test_field_that_is_not_the_earths_is_told_and_kept(log):
     """Its direction is what counts; the unit may be wrong."""
     log.rows["mag_new"], log.rows["mag_b_ut"] = 1, [0.2, 0.0, 0.4]

@@ -96,11 +96,12 @@ def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list
         first = int(np.flatnonzero(~good)[0])
         raise LogError(f"{source.path}: {n - good.sum()} of {n} rows lack a number, the first is {source.row(first)}")
     keep = np.flatnonzero(good)
-    steps = np.diff(t_s[keep])
-    late = np.flatnonzero(steps < 0.0)
-    for k in late[steps[late] < -LATEST_S][:1]:
-        why = f"runs back from {t_s[keep[k]]:g} to {t_s[keep[k + 1]]:g} s: a clock that was set, or two logs in one"
-        raise source.refusal(int(keep[k + 1]), "time", why)
+    latest_s = np.maximum.accumulate(t_s[keep])
+    behind_s = latest_s - t_s[keep]  # behind the latest so far, not the row before: a log may run back step by step
+    for k in np.flatnonzero(behind_s > LATEST_S)[:1]:
+        why = f"runs back from {latest_s[k]:g} to {t_s[keep[k]]:g} s: a clock that was set, or two logs in one"
+        raise source.refusal(int(keep[k]), "time", why)
+    late = np.flatnonzero(np.diff(t_s[keep]) < 0.0)
     if len(late):
         first_row = source.row(int(keep[late[0] + 1]))
         repairs.append(f"{source.column('time')}: {len(late)} out of order, sorted; first {first_row}")

@@ -5,8 +5,8 @@ of the interval, its length, mean rate and specific force, GPS velocity and posi
 field in counts where a sample arrived, airspeed.  The attitudes (``*_truth``, or what the original firmware printed)
 are the nine elements of the body-to-earth rotation, row by row.
 
-Where the attitudes are what firmware printed, the input is rounded as that firmware got it, and `RecordedLog.suits`
-holds how that firmware was set, for the estimators that have such parameters.
+What the input was made with, and how an original was set for the output that it is compared with, is known by the
+names of the files, and goes to the estimators that have such a parameter (`RecordedLog.suits`).
 """
 
 import csv
@@ -19,19 +19,30 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.ap_dcm_params import JULY_2013
 from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
 COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
 LEAST_FIX = 3  # a fix of three dimensions
-DECLINATION_DEG = {"E100": 0.0}  # of the field in the set; 10 in the others
-# What ArduPilot of July 2013 was given in steps: GPS in cm/s and hundredths of a degree, field in counts.
-STEPS = {
-    "gps_v_e_m_s": 0.01, "gps_speed_m_s": 0.01, "gps_course_rad": math.radians(0.01), "mag_b_ut": COUNT_UT,
-}  # fmt: skip
 INPUT = ("t", "dt", "gx", "gy", "gz", "ax", "ay", "az", "gps_new", "gps_vn", "gps_ve", "gps_vd", "gps_fix",
          "mag_new", "mx", "my", "mz", "airspeed", "gps_n", "gps_e", "gps_d")  # fmt: skip
+SUITS = {  # by the name of the set: its receiver does not filter, but it may be late; E100 has none
+    "A50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.0},
+    "C50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.4},
+    "C40": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.25},
+}
+SETTINGS: dict[str, dict[str, Any]] = {  # of the originals, by the end of the name of their output
+    "_ap2013_gps": {"quirks": "JULY_2013", "use_compass": 0.0},
+    "_ap2013_mag": {"quirks": "JULY_2013"},
+    "_ap2013_mag_nogps_copter": {"quirks": "JULY_2013", "fly_forward": 0.0},
+    "_mp_gpscent": {"centrifugal_from_gps": 1.0, "keep_tilt": 0.0},
+}
+AP2013_STEPS = {  # that original got whole centimetres a second, hundredths of a degree, and counts
+    "gps_v_e_m_s": 0.01,
+    "gps_speed_m_s": 0.01,
+    "gps_course_rad": math.radians(0.01),
+    "mag_b_ut": COUNT_UT,
+}
 ATTITUDE = ("t", *(f"r{i}{j}" for i in range(3) for j in range(3)))
 
 
@@ -69,26 +80,20 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     instruments = ["gyro", "accelerometer"]
     instruments += [name for name, has in (("gps", fixes), ("magnetometer", rows["mag_new"])) if np.any(has)]
     instruments += ["airspeed"] if flown_through_air else []
-    compared = _reference(path, reference, table["t"])
-    suits: dict[str, Any] = {"declination_rad": math.radians(DECLINATION_DEG.get(path.name.partition("_")[0], 10.0))}
-    if compared is not None and compared.kind == "firmware":
-        suits |= _as_set(compared.name)
-        if "_ap2013" in compared.name:
-            for column, step in STEPS.items():
-                rows[column] = step * np.rint(rows[column] / step)
-    return RecordedLog(rows, path.name, tuple(instruments), compared, suits=suits)
+    attitudes = _reference(path, reference, table["t"])
+    if attitudes is not None and "_ap2013_" in attitudes.name:
+        for column, step in AP2013_STEPS.items():
+            rows[column] = step * np.rint(rows[column] / step)
+    return RecordedLog(rows, path.name, tuple(instruments), attitudes, suits=_suits(path, attitudes))
 
 
-def _as_set(output: str) -> dict[str, Any]:
-    """How the firmware was set that printed the file `output`, as parameters of `ap_dcm` and `matrixpilot`."""
-    if "_ap2013" in output:
-        return {
-            "quirks": sorted(JULY_2013),
-            "use_compass": "_mag" in output,
-            "fly_forward": "_copter" not in output,
-        }
-    classic = "_gpscent" in output
-    return {"centrifugal_from_gps": classic, "keep_tilt": not classic}
+def _suits(path: Path, attitudes: Reference | None) -> dict[str, Any]:
+    """What is known of the set of `path`, and of the original that printed the `attitudes`."""
+    suits: dict[str, Any] = dict(SUITS.get(path.name.partition("_")[0], {}))
+    for end, settings in SETTINGS.items():
+        if attitudes is not None and attitudes.name.endswith(end):
+            suits |= settings
+    return suits
 
 
 def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | None:
@@ -116,13 +121,23 @@ def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
     missing = [name for name in wanted if name not in header]
     if missing:
         raise LogError(f"{path}: no column {', '.join(missing)}; it has {', '.join(header) or 'none'}")
-    try:
-        values = np.array([[float(cell) for cell in line] for line in lines], dtype=float)
-    except ValueError as error:
-        raise LogError(f"{path}: row {lines.line_num}: {error}") from error
-    if values.ndim != 2 or values.shape[1] != len(header):
-        raise LogError(f"{path}: {len(values)} rows; each must have the {len(header)} numbers of the header")
+    rows = []
+    for line in lines:
+        if len(line) != len(header):
+            raise LogError(f"{path}: line {lines.line_num}: {len(line)} cells; the header has {len(header)}")
+        where = f"{path}: line {lines.line_num}, column"
+        rows.append([_number(cell, where, name) for name, cell in zip(header, line, strict=True)])
+    if not rows:
+        raise LogError(f"{path}: no row of numbers")
+    values = np.array(rows)
     return {name: values[:, header.index(name)] for name in wanted}
+
+
+def _number(cell: str, where: str, name: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        raise LogError(f"{where} {name}: {cell!r} is no number") from None
 
 
 def _vector(table: dict[str, Array], *names: str) -> Array:
