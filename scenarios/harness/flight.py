@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import is_dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from estimator.interface import AttitudeEstimator
@@ -10,13 +10,12 @@ from scenarios.harness.air_config import build_air
 from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, override, resolve
 from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator
+from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, with_params
 from scenarios.harness.scenario import Scenario
 from sim.events import events_of_faults
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Flight, Log
 from sim.loop import Watch, fly
-from sim.params import changed
 from sim.plant import HandThrow, InFlight, Start
 from sim.power_up import sample_at_rest
 from sim.sensors.suite import Suite
@@ -129,10 +128,4 @@ def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
 def _estimator(config: FlightConfig) -> AttitudeEstimator:
     """The estimator by name, its parameter dataclass changed where the configuration says so."""
     estimator = load_estimator(config.estimator)
-    if not config.estimator_params:
-        return estimator
-    params = getattr(estimator, "params", None)
-    if not is_dataclass(params):
-        raise ValueError(f"estimator {config.estimator!r} has no parameters (a dataclass in its attribute params)")
-    what = f"estimator {config.estimator}"
-    return type(estimator)(changed(params, config.estimator_params, what))  # type: ignore[call-arg]
+    return with_params(estimator, config.estimator, config.estimator_params)

@@ -17,6 +17,7 @@ import inspect
 import sys
 from collections import ChainMap
 from collections.abc import Mapping
+from dataclasses import is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
+from sim.params import changed
 from sim.params import near_misses as near_misses
 
 if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
@@ -75,6 +77,26 @@ def load_estimator(spec: str) -> "AttitudeEstimator":
     if reference not in ("course", "nose"):
         raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
     return estimator
+
+
+def with_params(estimator: "AttitudeEstimator", spec: str, values: Mapping[str, Any]) -> "AttitudeEstimator":
+    """A new estimator like `estimator`, which `spec` names, with `values` of its parameters; itself where none are.
+
+    Raises
+    ------
+    ValueError      in one line: it has no parameters, none of that name, or a value that it refuses
+    """
+    if not values:
+        return estimator
+    before = getattr(estimator, "params", None)
+    if not is_dataclass(before):
+        raise ValueError(f"estimator {spec!r} has no parameters (a dataclass in its attribute params)")
+    after = changed(before, values, f"estimator {spec}")
+    maker: Any = type(estimator)
+    try:
+        return maker(after)
+    except TypeError as error:
+        raise ValueError(f"estimator {spec!r}: its class must take its params as an argument: {error}") from error
 
 
 def heading_reference_of(estimator: object) -> "HeadingReference":

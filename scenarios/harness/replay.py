@@ -11,7 +11,7 @@ a time to settle.  Against firmware every row counts: two runs of one algorithm 
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, is_dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,12 +24,11 @@ from scenarios.harness import console
 from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import heading_reference_of, load_estimator
+from scenarios.harness.plugins import heading_reference_of, load_estimator, with_params
 from sim.acceptance import FlightCodeFailed, estimate_of
 from sim.events import events_of
 from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.oracle import Oracle
-from sim.params import changed
 
 CALIBRATION_S = 2.0
 STILL_M_S, STILL_M_S2 = 2.0, 0.7  # faster over the ground, or shaken more than this (sigma), is not at rest
@@ -106,13 +105,8 @@ def make(spec: str, params: Mapping[str, Any]) -> AttitudeEstimator:
     estimator = load_estimator(spec)
     if isinstance(estimator, Oracle):
         raise ValueError("the oracle reads the truth from a simulator: it cannot be replayed over a log")
-    if not params:
-        return estimator
-    before = getattr(estimator, "params", None)
-    if not is_dataclass(before):
-        raise ValueError(f"estimator {spec!r} has no parameters (a dataclass in its attribute params)")
     values = {name.removeprefix("estimator_params."): literal(value) for name, value in params.items()}
-    return type(estimator)(changed(before, values, f"estimator {spec}"))  # type: ignore[call-arg]
+    return with_params(estimator, spec, values)
 
 
 def suited(spec: str, suits: Mapping[str, Any]) -> dict[str, Any]:

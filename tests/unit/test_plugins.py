@@ -1,6 +1,7 @@
 """Flight code by name: what is found, and how what cannot be used is refused in one line."""
 
 import re
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -156,3 +157,20 @@ def test_load_autopilot_with_the_update_of_an_estimator_is_refused(file_of) -> N
     """An estimator named in the place of an autopilot is noticed."""
     with pytest.raises(plugins.PluginError, match=r"must be update\(estimate, measurements, setpoint\)"):
         plugins.load_autopilot(f"{file_of(FINE)}:Fine")
+
+
+@dataclass(frozen=True)
+class _Gain:
+    gain: float = 1.0
+
+
+class _TakesNothing:
+    params = _Gain()
+
+
+def test_with_params_of_a_class_that_takes_none_is_one_line():
+    """A person's own class with parameters that it cannot be given is told what is missing."""
+    with pytest.raises(ValueError, match=r"estimator 'mine': its class must take its params as an argument"):
+        plugins.with_params(_TakesNothing(), "mine", {"gain": 2.0})
+    mine = _TakesNothing()
+    assert plugins.with_params(mine, "mine", {}) is mine
