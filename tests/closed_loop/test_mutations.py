@@ -2,6 +2,7 @@
 
 Each row of the table is a scenario and what breaks it: a baseline, or the default estimator with one idea of the
 paper taken out; and the check that must notice.  The unbroken estimator passes the same seeds in `test_scenarios`.
+For `gps_latency`, whose point is a failure, it is the cure that must fail.
 """
 
 from typing import NamedTuple
@@ -10,9 +11,10 @@ import pytest
 
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.registry import find, registered
-from scenarios.harness.verdict import judge
+from scenarios.harness.verdict import Verdict, judge
 from sim.log import Outcome
 
+SEEDS = (0, 1)
 NO_OFFSET = {"estimator_params.k_i": 0}
 NO_LAG_FILTER = {"estimator_params.gps_lag_filter": "false", "estimator_params.rotate_history": "false"}
 WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
@@ -63,9 +65,10 @@ def test_every_scenario_has_a_mutation():
 
 @pytest.mark.parametrize("mutation", MUTATIONS, ids=lambda m: f"{m.scenario}-{m.estimator}-{'-'.join(m.changes)}")
 def test_scenario_notices_what_is_broken(mutation):
-    """The check that is about what was taken out fails, and not because the flight was cut short."""
+    """Pooled as the gate does, the check that is about what was taken out fails, and not only on flights cut short."""
     scenario = find(mutation.scenario)
-    flight = fly_scenario(scenario, mutation.changes, seed=0, estimator=mutation.estimator)
-    noticed = next(row for row in judge(scenario, flight).rows if row.name == mutation.noticed_by)
+    flown = [fly_scenario(scenario, mutation.changes, seed=s, estimator=mutation.estimator) for s in SEEDS]
+    (pooled,) = Verdict.of((scenario, judge(scenario, flight)) for flight in flown).pooled
+    noticed = pooled.rows[[check.name for check in scenario.checks].index(mutation.noticed_by)]
     assert not noticed.passed, noticed
-    assert (flight.outcome == Outcome.COMPLETED) == (noticed.name != "survived"), flight.message
+    assert mutation.noticed_by == "survived" or any(flight.outcome == Outcome.COMPLETED for flight in flown)
