@@ -124,6 +124,23 @@ def gyro_bias_error_deg_s(flight: Flight) -> Series:
     return _series(flight, np.degrees(np.linalg.norm(difference, axis=1)))
 
 
+def rate_size_deg_s(axis: str) -> SeriesOf:
+    """Size of the true rate about the body `axis`, x, y or z, deg/s: mean over the tick."""
+    i = "xyz".index(axis)
+    return lambda flight: _series(flight, np.degrees(np.abs(flight.log.truth["imu_omega_b_rad_s"][:, i])))
+
+
+def rate_error_deg_s(axis: str) -> SeriesOf:
+    """Error of the drift-corrected rate about the body `axis`, x, y or z, deg/s: estimate less truth over the tick."""
+    i = "xyz".index(axis)
+
+    def series(flight: Flight) -> Series:
+        error = flight.log.flown["omega_b_rad_s"][:, i] - flight.log.truth["imu_omega_b_rad_s"][:, i]
+        return _series(flight, np.degrees(error))
+
+    return series
+
+
 def wind_error_m_s(flight: Flight) -> Series:
     """Error of the estimated horizontal wind against the flight's mean true wind, m/s; judged where there is one."""
     mean = flight.log.truth["wind_e_m_s"][:, :2].mean(axis=0)
@@ -182,6 +199,11 @@ def after(moment: Moment, delay_s: float) -> Moment:
 def rms(values: Array) -> float:
     """Root of the mean square; NaN where there is nothing."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
+
+
+def mean_size(values: Array) -> float:
+    """Size of the mean: what is left once noise has averaged out; NaN where there is nothing."""
+    return float(abs(np.mean(values))) if len(values) else math.nan
 
 
 def p95(values: Array) -> float:

@@ -31,11 +31,14 @@ from scenarios.harness.metrics import (
     inclination_error_deg,
     launch_distance_at_m,
     lowest,
+    mean_size,
     nearest_m,
     orthogonality_error,
     over,
     p95,
     pass_time_s,
+    rate_error_deg_s,
+    rate_size_deg_s,
     rms,
     settling,
     summary,
@@ -207,6 +210,21 @@ def test_gyro_bias_wind_and_orthogonality_errors_are_the_differences_put_in():
     np.testing.assert_allclose(gyro_bias_error_deg_s(flight).judged_values, 5.0, rtol=0, atol=ROUND_OFF_DEG)
     np.testing.assert_allclose(wind_error_m_s(flight).judged_values, 0.5, rtol=0, atol=1e-12)
     np.testing.assert_allclose(orthogonality_error(flight).judged_values, 1.01**2 - 1.0, rtol=0, atol=1e-12)
+
+
+def test_rate_error_of_one_axis_is_estimate_less_truth():
+    """-20 deg/s about y told as -18.5, and x and z wrong by more: 1.5 deg/s, of a true 20."""
+    flight = made_up(2.0)
+    flight.log.truth["imu_omega_b_rad_s"] = np.radians([3.0, -20.0, 7.0])
+    flight.log.flown["omega_b_rad_s"] = np.radians([30.0, -18.5, -70.0])
+    np.testing.assert_allclose(rate_error_deg_s("y")(flight).judged_values, 1.5, rtol=0, atol=ROUND_OFF_DEG)
+    np.testing.assert_allclose(rate_size_deg_s("y")(flight).judged_values, 20.0, rtol=0, atol=ROUND_OFF_DEG)
+
+
+def test_mean_size_lets_noise_cancel_and_forgets_the_sign():
+    """-2.5 with +-1 beside it is 2.5; of nothing it is NaN."""
+    assert mean_size(np.array([-1.5, -3.5, -2.5])) == 2.5
+    assert math.isnan(mean_size(np.empty(0)))
 
 
 def test_wind_error_where_none_is_estimated_is_not_judged():
