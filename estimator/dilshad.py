@@ -60,7 +60,7 @@ from estimator.interface import Array, Column, HeadingReference, ImuSample, Inst
 from estimator.jit import kernel
 from estimator.kernels import wrap
 from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
-from estimator.pi import feed_back, weigh
+from estimator.pi import corrected_rate, feed_back, weigh
 from estimator.rotation import integrate
 from estimator.screening import (
     FORCE_GOOD,
@@ -70,7 +70,6 @@ from estimator.screening import (
     attitude_at_rest,
     offset_at_rest,
     screen,
-    take_rate,
 )
 
 HEADING_LIFE_S = 1.0  # a magnetometer silent for longer corrects nothing any more
@@ -174,16 +173,6 @@ def heading_of_field(m, f):  # type: ignore[no-untyped-def]
     x = mx * cos_p + mz * sin_p  # Eqn 5
     y = mx * sin_r * sin_p + my * cos_r - mz * sin_r * cos_p  # Eqn 6
     return np.arctan2(y, x)  # Eqn 7
-
-
-@kernel
-def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
-    """The rate to integrate: gyro less offset and plus corrections; ``s.omega_b_rad_s`` is it without P."""
-    for i in range(3):
-        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
-    take_rate(row, s, good)
-    for i in range(3):
-        s.omega_total_b[i] = s.omega_b_rad_s[i] + s.omega_p_b[i]
 
 
 @kernel

@@ -16,6 +16,17 @@ import numpy as np
 
 from estimator.jit import inlined
 from estimator.kernels import clip
+from estimator.screening import take_rate
+
+
+@inlined
+def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
+    """The rate to integrate: gyro less offset and plus corrections (Eqn 16); ``s.omega_b_rad_s`` is it without P."""
+    for i in range(3):
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
+    take_rate(row, s, good)
+    for i in range(3):
+        s.omega_total_b[i] = s.omega_b_rad_s[i] + s.omega_p_b[i]
 
 
 @inlined

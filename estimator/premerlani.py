@@ -72,7 +72,7 @@ from estimator.gps_lag import (
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import inlined, kernel
 from estimator.kernels import clip
-from estimator.pi import correct, learn_offset, weigh
+from estimator.pi import correct, corrected_rate, learn_offset, weigh
 from estimator.rotation import integrate
 from estimator.screening import (
     FORCE_GOOD,
@@ -83,7 +83,6 @@ from estimator.screening import (
     attitude_at_rest,
     offset_at_rest,
     screen,
-    take_rate,
 )
 from estimator.wind import WIND_FILTER, learn_wind
 
@@ -195,16 +194,6 @@ _STATE = (
     Column("locked", (), "1 once yaw was found", integer=True),
 )
 STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + LAG + _PARAMS + _STATE)
-
-
-@inlined
-def corrected_rate(row, s, good):  # type: ignore[no-untyped-def]
-    """The rate to integrate: gyro less offset and plus corrections (Eqn 16); ``s.omega_b_rad_s`` is it without P."""
-    for i in range(3):
-        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
-    take_rate(row, s, good)
-    for i in range(3):
-        s.omega_total_b[i] = s.omega_b_rad_s[i] + s.omega_p_b[i]
 
 
 @inlined
