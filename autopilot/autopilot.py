@@ -18,7 +18,7 @@ from autopilot.guidance import (
     throttle_for,
     unseen_turn,
 )
-from autopilot.interface import ActuatorCommand, Mode, Setpoint
+from autopilot.interface import MOST_WAYPOINTS, ActuatorCommand, Mode, Setpoint
 from autopilot.launch import climb_away, feel_throw
 from autopilot.mixer import mix
 from autopilot.stabilise import rate_control, rate_demand
@@ -33,8 +33,13 @@ def _floats(params: type[Any]) -> np.dtype[Any]:
 
 _GROUPS: dict[str, Any] = {f.name: f.default_factory for f in fields(AutopilotParams)}
 _PARAMS = np.dtype([(name, _floats(group)) for name, group in _GROUPS.items()], align=True)
-_NOT_FLOAT = {"mode": "i8", "rate_b_rad_s": ("f8", (3,))}
-_ASKED = np.dtype([(f.name, _NOT_FLOAT.get(f.name, "f8")) for f in fields(Setpoint)], align=True)
+_NOT_FLOAT: dict[str, Any] = {
+    "mode": "i8", "inverted": "i8", "left": "i8", "radio": "i8",
+    "rate_b_rad_s": ("f8", (3,)), "route": ("f8", (MOST_WAYPOINTS, 3)),
+}  # fmt: skip
+_ASKED = np.dtype(
+    [*((f.name, _NOT_FLOAT.get(f.name, "f8")) for f in fields(Setpoint)), ("n_waypoints", "i8")], align=True
+)
 _STATE = np.dtype(
     [
         ("mode", "i8"),  # of the last tick, -1 before the first
@@ -52,7 +57,7 @@ _STATE = np.dtype(
 # One array with all that the kernel needs beside the tick's inputs: each array argument costs time per call.
 _MEMORY = np.dtype([("p", _PARAMS), ("asked", _ASKED), ("s", _STATE), ("on_nose", "i8")], align=True)
 
-MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH = (int(mode) for mode in Mode)
+MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL = (int(m) for m in Mode)
 _WIND_UNKNOWN = np.full(3, np.nan)
 _DT_LIMIT_S = 0.1  # a longer sample interval is a gap; the integrals do not take it whole
 
@@ -92,10 +97,11 @@ def guide(R_eb, wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def steer(R_eb, omega_b_rad_s, wind_e_m_s, rows, k, memory):  # type: ignore[no-untyped-def]
+def steer(R_eb, omega_b_rad_s, wind_e_m_s, health, rows, k, memory):  # type: ignore[no-untyped-def]  # noqa: ARG001
     """One tick: aileron, elevator, rudder, throttle, mode, bank demand and pitch demand.
 
     R_eb : shape (3, 3), estimated   omega_b_rad_s : shape (3,), corrected   wind_e_m_s : shape (3,) or NaN
+    health : int, what the estimator says of itself
     rows, k : measured log and its row   memory : shape (1,), parameters, set-point and state
     """
     me = memory[0]
@@ -130,6 +136,17 @@ def steer(R_eb, omega_b_rad_s, wind_e_m_s, rows, k, memory):  # type: ignore[no-
         throttle = asked.throttle
     aileron, elevator, rudder, throttle = mix(control[0], control[1], control[2], throttle, me.p.mixer)
     return aileron, elevator, rudder, throttle, asked.mode, bank, pitch
+
+
+def _write(setpoint: Setpoint, asked: Any) -> None:
+    """Copy `setpoint` into the record `asked`; rows of the route that nobody asked for are NaN."""
+    for f in fields(Setpoint):
+        if f.name != "route":
+            asked[f.name] = getattr(setpoint, f.name)
+    n = asked["n_waypoints"] = len(setpoint.route)
+    asked["route"] = np.nan
+    if n:
+        asked["route"][:n] = setpoint.route
 
 
 class Snapshot(NamedTuple):
@@ -180,14 +197,14 @@ class DcmAutopilot:
     def update(self, estimate: AttitudeEstimate, m: Measurements, setpoint: Setpoint) -> ActuatorCommand:
         """Steer for one tick: `steer` above, on the estimate, the row of measurements and the set-point."""
         if setpoint is not self._setpoint:
-            self._memory["asked"][0] = astuple(setpoint)
+            _write(setpoint, self._memory["asked"][0])
             self._setpoint = setpoint
         R_eb, omega, wind = estimate.R_eb, estimate.omega_b_rad_s, estimate.wind_e_m_s
         if wind is None:
             wind = _WIND_UNKNOWN
         if not (R_eb.__class__ is omega.__class__ is wind.__class__ is np.ndarray):  # somebody's lists
             R_eb, omega, wind = (np.ascontiguousarray(x, np.float64) for x in (R_eb, omega, wind))
-        return ActuatorCommand._make(steer(R_eb, omega, wind, m.rows, m.k, self._memory))
+        return ActuatorCommand._make(steer(R_eb, omega, wind, int(estimate.health), m.rows, m.k, self._memory))
 
     def snapshot(self) -> Snapshot:
         """All that changes in flight, for `restore`."""

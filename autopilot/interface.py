@@ -9,7 +9,7 @@ from estimator.interface import AttitudeEstimate, Measurements
 
 
 class Mode(IntEnum):
-    """How the set-point is read."""
+    """How the set-point is read.  The last three are asked for by nobody: failsafes, see `autopilot.failsafe`."""
 
     MANUAL = 0  # sticks move the surfaces
     RATE = 1  # sticks command body rates
@@ -17,6 +17,22 @@ class Mode(IntEnum):
     COURSE = 3  # course and height are held
     RETURN = 4  # back to the launch point, then passes over it again and again
     LAUNCH = 5  # motor off until the throw is felt, then a straight climb to the height
+    LOITER = 6  # round a point at a height
+    WAYPOINTS = 7  # along a route, leg by leg
+    CIRCLE = 8  # no position: a gentle circle where one is, at cruise
+    GLIDE = 9  # no position for long: the same circle, motor off, until somebody helps or the ground comes
+    LEVEL = 10  # no attitude to believe: wings level on the gyros alone
+
+
+class Waypoint(NamedTuple):
+    """A point of a route, from the launch point."""
+
+    north_m: float
+    east_m: float
+    height_m: float
+
+
+MOST_WAYPOINTS = 32
 
 
 _UPRIGHT_RAD = math.radians(85.0)  # the attitude modes hold no steeper bank or pitch: beyond, fly RATE
@@ -30,7 +46,12 @@ _RANGES = (
     ("height_m", -1e5, 1e5, "m"),
     ("bank_limit_rad", 0.0, _UPRIGHT_RAD, "rad"),
     ("throttle", 0.0, 1.0, "of full throttle"),
+    ("north_m", -1e5, 1e5, "m"),
+    ("east_m", -1e5, 1e5, "m"),
+    ("radius_m", 1.0, 1e5, "m"),
+    ("airspeed_m_s", 1.0, 200.0, "m/s"),
 )
+_MAY_BE_NAN = ("throttle", "airspeed_m_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +62,15 @@ class Setpoint:
     rate_b_rad_s : (p, q, r)             RATE: body rates to follow
     bank_rad, pitch_rad : float          STABILISE
     course_rad : float                   COURSE: over ground (or nose, where the estimator knows only that)
-    height_m : float                     COURSE, RETURN, LAUNCH: above the launch point
-    bank_limit_rad : float               COURSE, RETURN: the steepest bank used to turn
+    height_m : float                     COURSE, RETURN, LAUNCH, LOITER: above the launch point
+    bank_limit_rad : float               COURSE, RETURN, LOITER, WAYPOINTS: the steepest bank used to turn
     throttle : 0..1 or NaN               NaN leaves the throttle to the autopilot (MANUAL: NaN is off)
+    inverted : bool                      STABILISE, COURSE: on its back; bank and pitch count from there
+    north_m, east_m, radius_m : float    LOITER: centre, from the launch point, and radius
+    left : bool                          LOITER: turning left
+    route : of `Waypoint`                WAYPOINTS: flown in order, then again from the first; 1 to 32
+    airspeed_m_s : float or NaN          COURSE, RETURN, LOITER, WAYPOINTS: NaN is cruise
+    radio : bool                         False: the pilot is not heard any more, the rest is what he asked for last
     """
 
     mode: Mode
@@ -57,15 +84,30 @@ class Setpoint:
     height_m: float = 50.0
     bank_limit_rad: float = math.radians(35.0)
     throttle: float = math.nan
+    inverted: bool = False
+    north_m: float = 0.0
+    east_m: float = 0.0
+    radius_m: float = 60.0
+    left: bool = False
+    route: tuple[Waypoint, ...] = ()
+    airspeed_m_s: float = math.nan
+    radio: bool = True
 
     def __post_init__(self) -> None:
         """Refuse what no aeroplane can be asked, here and not in the air."""
         for name, low, high, unit in _RANGES:
             value = getattr(self, name)
-            if not low <= value <= high and not (name == "throttle" and math.isnan(value)):
+            if not low <= value <= high and not (name in _MAY_BE_NAN and math.isnan(value)):
                 raise ValueError(f"Setpoint.{name}: {value!r} {unit} is not within {low:g} .. {high:g}")
         if len(self.rate_b_rad_s) != 3 or not all(map(math.isfinite, self.rate_b_rad_s)):
             raise ValueError(f"Setpoint.rate_b_rad_s: {self.rate_b_rad_s!r} rad/s must be finite (p, q, r)")
+        if len(self.route) > MOST_WAYPOINTS or (self.mode == Mode.WAYPOINTS and not self.route):
+            raise ValueError(f"Setpoint.route: {len(self.route)} waypoints: choose 1 to {MOST_WAYPOINTS}")
+        for number, waypoint in enumerate(self.route):
+            if len(waypoint) != 3 or not all(math.isfinite(x) and abs(x) <= 1e5 for x in waypoint):
+                raise ValueError(
+                    f"Setpoint.route[{number}]: {tuple(waypoint)!r} m must be north, east, height within 1e5"
+                )
 
 
 class ActuatorCommand(NamedTuple):

@@ -43,6 +43,7 @@ SCENARIO = Scenario(
         manoeuvre={"height_m": 150.0},
     ),
     script=_script,
+    shows_failure=True,
     # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,

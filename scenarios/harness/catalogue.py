@@ -13,7 +13,7 @@ _ROOT = Path(__file__).resolve().parents[2]
 def catalogue() -> dict[str, dict[str, str]]:
     """Everything that has a name on the command line: kind -> name -> one line about it, names in order."""
     found = {
-        "scenarios": {p.stem: _first_line(_tree(p)) for p in (_ROOT / "scenarios").glob("[!_]*.py")},
+        "scenarios": {n: told for p in (_ROOT / "scenarios").glob("[!_]*.py") for n, told in _scenarios(p).items()},
         "estimators": {name: _about(where) for name, where in plugins.estimators().items()},
         "autopilots": {name: _about(where) for name, where in plugins.autopilots().items()},
         "aircraft": aircraft(),
@@ -21,6 +21,16 @@ def catalogue() -> dict[str, dict[str, str]]:
         "parts": parts(),
     }
     return {kind: dict(sorted(things.items())) for kind, things in found.items()}
+
+
+def _scenarios(path: Path) -> dict[str, str]:
+    """The scenario of a file and its variants, each with a line about it."""
+    tree = _tree(path)
+    told = {path.stem: _first_line(tree)}
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "VARIANTS" for t in node.targets):
+            told |= {f"{path.stem}_{ending}": line for ending, line in ast.literal_eval(node.value).items()}
+    return told
 
 
 def aircraft() -> dict[str, str]:

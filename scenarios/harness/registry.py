@@ -1,10 +1,16 @@
-"""The scenarios there are: every module of the package that exports ``SCENARIO``, and anyone's own file."""
+"""The scenarios there are: of every module of the package, and of anyone's own file.
+
+A module exports ``SCENARIO``, named as its file.  One that has variants exports besides ``VARIANTS``, a literal
+dictionary from the ending of each name to the line that tells of it (so that a listing need import nothing), and
+``SCENARIOS``, the first and its variants in that order.
+"""
 
 import importlib
 import importlib.util
 import pkgutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -20,9 +26,26 @@ def registered() -> Mapping[str, Scenario]:
     found = {}
     for info in sorted(pkgutil.iter_modules(scenarios.__path__), key=lambda info: info.name):
         if not info.ispkg:
-            scenario = _of(importlib.import_module(f"scenarios.{info.name}"), info.name)
-            found[scenario.name] = scenario
+            for scenario in _family(importlib.import_module(f"scenarios.{info.name}"), info.name):
+                found[scenario.name] = scenario
     return MappingProxyType(found)
+
+
+def matching(patterns: Iterable[str]) -> list[str]:
+    """Names, each once, of the scenarios that `patterns` ask for: a name, a file of one's own, or ``hand_launch*``.
+
+    ValueError for a pattern that nothing is called by; a plain name is taken as it is.
+    """
+    names: dict[str, None] = {}
+    for pattern in patterns:
+        if "*" in pattern or "?" in pattern:
+            found = [name for name in registered() if fnmatchcase(name, pattern)]
+            if not found:
+                raise ValueError(f"no scenario is called {pattern!r}: choose from {', '.join(registered())}")
+            names |= dict.fromkeys(found)
+        else:
+            names[pattern] = None
+    return list(names)
 
 
 def find(name: str) -> Scenario:
@@ -62,3 +85,13 @@ def _of(module: ModuleType, where: str) -> Scenario:
     if not isinstance(scenario, Scenario):
         raise ValueError(f"scenario {where!r}: must export SCENARIO, a Scenario")
     return scenario
+
+
+def _family(module: ModuleType, where: str) -> tuple[Scenario, ...]:
+    """The scenario of a module of the package and its variants; ValueError where their names are not as told."""
+    first = _of(module, where)
+    family: tuple[Scenario, ...] = getattr(module, "SCENARIOS", (first,))
+    names = [where, *(f"{where}_{ending}" for ending in getattr(module, "VARIANTS", {}))]
+    if family[0] is not first or [scenario.name for scenario in family] != names:
+        raise ValueError(f"scenario {where!r}: SCENARIOS must be SCENARIO and its VARIANTS, {', '.join(names)}")
+    return family

@@ -1,11 +1,12 @@
 """A scenario: what flies, where, through what air, commanded how, for how long, and what it must pass."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from autopilot.pilot import Script
 from scenarios.harness.checks import Check
-from scenarios.harness.config import FlightConfig
+from scenarios.harness.config import FlightConfig, override
 from sim.log import Event, Flight
 
 Moments = Callable[[Flight], Iterable[float]]  # times since the release
@@ -13,14 +14,16 @@ Moments = Callable[[Flight], Iterable[float]]  # times since the release
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One scenario; its file exports it as ``SCENARIO``.
+    """One scenario; its file exports it as ``SCENARIO``, and variants of it as ``SCENARIOS``.
 
-    name        as typed on the command line
+    name        as typed on the command line: that of its file, a variant's with an ending
     story       the docstring of its file: a table of Story / Verifies / Aircraft / Wind / Sensors / Passes when
     config      what is flown where nothing is overridden
     script      the set-points, from the resolved configuration
     checks      what it must pass
     milestones  moments found in the truth of the flight, by what to call them; they become events
+    shows_failure   it passes where its own estimator fails as the paper says, and for no estimator that copes:
+                where all scenarios are flown with an estimator of one's own, this one is left out
     """
 
     name: str
@@ -29,6 +32,7 @@ class Scenario:
     script: Callable[[FlightConfig], Script]
     checks: tuple[Check, ...]
     milestones: dict[str, Moments] = field(default_factory=dict)
+    shows_failure: bool = False
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():
@@ -43,6 +47,14 @@ class Scenario:
     def told_as(self) -> str:
         """The first line of the story."""
         return self.story.strip().splitlines()[0] if self.story.strip() else ""
+
+    def varied(self, ending: str, told: str, changes: Mapping[str, Any], **others: Any) -> "Scenario":
+        """A variant, called ``name_ending``: the configuration with `changes` by dotted names, `others` of the fields.
+
+        told : what becomes the first line of its story
+        """
+        story = "\n".join((told, *self.story.strip().splitlines()[1:]))
+        return replace(self, name=f"{self.name}_{ending}", story=story, config=override(self.config, changes), **others)
 
     def events(self, flight: Flight) -> tuple[Event, ...]:
         """The milestones that `flight` reached."""

@@ -10,15 +10,19 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from autopilot import AUTOPILOTS
-from autopilot.interface import ActuatorCommand, Autopilot, Mode, Setpoint
+from autopilot.interface import ActuatorCommand, Autopilot, Mode, Setpoint, Waypoint
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
 
 NAMES = sorted(AUTOPILOTS)
 compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
 finite = st.floats(-1e6, 1e6)
 vector = st.tuples(finite, finite, finite)
+ROUTE = (Waypoint(100.0, 0.0, 60.0), Waypoint(100.0, 150.0, 80.0), Waypoint(-50.0, 0.0, 60.0))
 setpoints = st.sampled_from(
-    [Setpoint(mode, aileron=0.2, bank_rad=0.3, rate_b_rad_s=(0.1, 1.5, 0.0), course_rad=4.0) for mode in Mode]
+    [
+        Setpoint(mode, aileron=0.2, bank_rad=0.3, rate_b_rad_s=(0.1, 1.5, 0.0), course_rad=4.0, route=ROUTE)
+        for mode in Mode
+    ]
 )
 
 
@@ -47,13 +51,13 @@ def flight(n, seed=3):
     rows["force_b_m_s2"] = random.normal((0.0, 0.0, -9.8), 3.0, (n, 3))
     attitudes = Rotation.from_rotvec(np.cumsum(random.normal(0.0, 0.05, (n, 3)), axis=0)).as_matrix()
     rates = random.normal(0.0, 0.5, (n, 3))
-    plan = [Setpoint(mode, bank_rad=0.4, course_rad=2.0) for mode in Mode]
+    plan = [Setpoint(mode, bank_rad=0.4, course_rad=2.0, route=ROUTE) for mode in Mode]
     for k in range(n):
         wind = None if k % 50 < 25 else np.array([3.0, -2.0, 0.0])
         yield (
             AttitudeEstimate(attitudes[k], rates[k], wind_e_m_s=wind),
             Measurements(rows, k),
-            plan[k * 6 // n],
+            plan[k * len(plan) // n],
         )
 
 
@@ -97,7 +101,7 @@ def test_update_any_rotation_and_measurement_gives_a_command_within_limits(name)
 def test_update_attitude_that_is_not_a_number_gives_neutral_controls(name, mode):
     """A NaN in any entry of the attitude or the rate: still controls, motor off, and sane again afterwards."""
     (good, m, _), *_ = flight(1)
-    setpoint = Setpoint(mode)
+    setpoint = Setpoint(mode, route=ROUTE)
     for entry in range(12):
         autopilot, fresh = make(name), make(name)
         R_eb, omega = good.R_eb.copy(), good.omega_b_rad_s.copy()
