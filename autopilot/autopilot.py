@@ -121,7 +121,9 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
             asked.north_m, asked.east_m, asked.radius_m, asked.left, me.p.route, p,
         )  # fmt: skip
     elif s.led_by == WAYPOINTS:
-        bank, wanted_m = bank_along_route(north, east, r_zy, row, height_m, asked, s, limit_rad, me.p.route, p)
+        bank, wanted_m = bank_along_route(
+            north, east, r_zy, wind_e_m_s, row, height_m, asked, s, limit_rad, me.p.route, p
+        )
     else:
         sine, cosine = heading_error(north, east, math.cos(asked.course_rad), math.sin(asked.course_rad))
         bank = bank_for_heading(sine, cosine, r_zy, limit_rad, p)
@@ -275,7 +277,9 @@ class DcmAutopilot:
         R_eb, omega, bias, wind, health = estimate
         if wind is None:
             wind = _WIND_UNKNOWN
-        if not (R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray):  # somebody's lists
+        if not (
+            R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray
+        ):  # somebody's lists
             R_eb, omega, bias, wind = (np.ascontiguousarray(x, np.float64) for x in (R_eb, omega, bias, wind))
         return ActuatorCommand._make(steer(R_eb, omega, bias, wind, int(health), m.rows, m.k, self._memory))
 

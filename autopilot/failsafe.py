@@ -58,8 +58,8 @@ class FailsafeParams:
     gps_lost_s: float = 3.0
     gps_back_s: float = 1.0
     circle_s: float = 30.0
-    bank_rad: float = math.radians(15.0)
-    glide_pitch_rad: float = math.radians(-3.0)
+    bank_rad: float = math.radians(10.0)
+    glide_pitch_rad: float = math.radians(-4.0)
     unhealthy_s: float = 5.0
     low_height_m: float = 20.0
     safe_height_m: float = 30.0
