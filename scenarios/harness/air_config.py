@@ -46,7 +46,7 @@ class GustConfig(_Model):
 class AirConfig(_Model):
     """The mean wind at 10 m, and what rides on it.
 
-    wind_from_deg : "random" any direction; by the heading at the start: "cross" from its left or its right, "head", "tail"
+    wind_from_deg : "random" any direction; by the heading at the start "cross" from its left or right, "head", "tail"
     shear : exponent of the wind's growth with height, 0 none, 0.14 open country, see `sim.air.profile`
     gusts : each as a `GustConfig` or as text, see `parse_gust`
     turbulence_w20_m_s : wind speed at 20 ft that scales the turbulence, MIL-F-8785C, 0 none; or light, moderate, severe
