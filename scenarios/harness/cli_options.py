@@ -14,7 +14,7 @@ SetOption = Annotated[
 ]
 WindOption = Annotated[
     str | None,
-    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm."),
+    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, 5@head, calm."),
 ]
 ShearOption = Annotated[
     str | None,

@@ -53,6 +53,13 @@ def warn_if_cold() -> None:
         err().print("compiling the kernels, this once: about half a minute", style="dim")
 
 
+def note_left_out(scenarios: Sequence[str]) -> None:
+    """Say which scenarios are not flown with an estimator of one's own, on one line of standard error."""
+    if scenarios:
+        names = ", ".join(scenarios)
+        err().print(f"left out: {names}: they pass where their own estimator fails", style="dim", soft_wrap=True)
+
+
 def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
     """Say which faults the flight is too short for, each on a line of standard error."""
     from scenarios.harness.fault_config import never_met
