@@ -24,6 +24,7 @@ from sim.log import Flight, Outcome, Phase
 
 STEEPEST_R_ZX = 0.9  # sine of the pitch beyond which heading is not judged
 SLOWEST_M_S = 3.0  # ground speed below which there is no course
+_ROUND_OFF_S = 1e-6  # of times; ticks lie at least milliseconds apart
 
 
 class Measured(NamedTuple):
@@ -67,8 +68,7 @@ SeriesOf = Callable[[Flight], Series]
 
 
 def _inside(t_s: Array, from_s: float, to_s: float) -> NDArray[np.bool_]:
-    margin_s = 1e-6  # ticks lie at least milliseconds apart: only round-off is forgiven
-    return (t_s > from_s + margin_s) & (t_s <= to_s + margin_s)
+    return (t_s > from_s + _ROUND_OFF_S) & (t_s <= to_s + _ROUND_OFF_S)
 
 
 def time_s(flight: Flight) -> Array:
@@ -82,8 +82,9 @@ def planned_end_s(flight: Flight) -> float:
 
 
 def _series(flight: Flight, value: Array, judged: NDArray[np.bool_] | None = None) -> Series:
-    flying = flight.log.truth["phase"] == Phase.FLYING
-    return Series(time_s(flight), value, flying if judged is None else flying & judged)
+    t_s = time_s(flight)
+    let_go = (flight.log.truth["phase"] >= Phase.FLYING) & (t_s > _ROUND_OFF_S)
+    return Series(t_s, value, let_go if judged is None else let_go & judged)
 
 
 def inclination_error_deg(flight: Flight) -> Series:
