@@ -5,8 +5,8 @@ A metric turns a flight into one value with the number of samples it rests on an
 holds; a flight that ended early, or a window in which nothing could be judged, shows in those two numbers.
 
 Attitude error is the angle of ``R_est @ R_true.T``, beside it its two parts: inclination, the angle between the
-two ``r_z`` rows, and heading, ``atan2(r_yx, r_xx)``.  Heading means nothing near the vertical or standing still,
-and is judged where ``|r_zx| < 0.9`` and the ground speed is above 3 m/s.
+two ``r_z`` rows, and heading, ``atan2(r_yx, r_xx)``.  Heading means nothing near the vertical, nor in the air standing
+still, and is judged where ``|r_zx| < 0.9`` and the ground speed is above 3 m/s; that of a nose on a table, too.
 """
 
 import math
@@ -108,12 +108,15 @@ def heading_error_deg(against: HeadingReference | None = None) -> SeriesOf:
     def series(flight: Flight) -> Series:
         truth, R_est = flight.log.truth, flight.log.flown["R_eb"]
         R_true, v_e = truth["R_eb"], truth["v_e_m_s"]
-        if (against or flight.heading_reference) == "course":
+        judged_against = against or flight.heading_reference
+        if judged_against == "course":
             error = wrap(heading_rad(R_est) - np.arctan2(v_e[:, 1], v_e[:, 0]))
         else:
             error = heading_error_rad(R_est, R_true)
-        judged = np.abs(R_true[:, 2, 0]) < STEEPEST_R_ZX
-        judged &= np.hypot(v_e[:, 0], v_e[:, 1]) > SLOWEST_M_S
+        judged = np.hypot(v_e[:, 0], v_e[:, 1]) > SLOWEST_M_S
+        if judged_against == "nose":
+            judged |= truth["phase"] == Phase.RESTING
+        judged &= np.abs(R_true[:, 2, 0]) < STEEPEST_R_ZX
         return _series(flight, np.degrees(np.abs(error)), judged)
 
     return series
