@@ -63,6 +63,11 @@ class AirConfig(_Model):
     thermal_m_s: float = Field(default=2.0, ge=0.0, le=10.0)
     inversion_m: float = Field(default=1200.0, ge=100.0, le=10000.0)
 
+    @property
+    def calm(self) -> bool:
+        """Whether nothing moves in it."""
+        return not (self.wind_m_s or self.gusts or self.turbulence_w20_m_s or self.thermals)
+
     @field_validator("gusts", mode="before")
     @classmethod
     def _typed_gusts(cls, gusts: Any) -> Any:

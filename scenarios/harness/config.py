@@ -104,6 +104,24 @@ class HandThrowStart(_Model):
         return self
 
 
+class BenchStart(_Model):
+    """At rest on a table indoors, and it stays there: no air moves, no motor runs, no command does anything.
+
+    height_m : of the table     calibration_s : from power-up, over which the gyro offset is measured; what is judged
+    begins after it
+    """
+
+    kind: Literal["bench"] = "bench"
+    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
+    roll_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
+    pitch_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
+    height_m: float = Field(default=0.8, ge=0.0, le=10.0)
+    calibration_s: float = Field(default=2.0, ge=0.0, le=600.0)
+
+
+AnyStart = InFlightStart | HandThrowStart | BenchStart
+
+
 class FlightConfig(_Model):
     """Everything that decides a flight, beside the code.
 
@@ -111,6 +129,8 @@ class FlightConfig(_Model):
     estimator_params : fields of the estimator's parameter dataclass
     duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
     changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
+    turn_table : the magnetometer was turned on a table before the flight: an estimator that has a parameter
+    ``calibration`` is given what that tells, see `compass`
     files : path -> text of the files of one's own that the suite is made of; a resolved configuration holds them
     manoeuvre : the scenario's own parameters
     faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
@@ -126,10 +146,11 @@ class FlightConfig(_Model):
     rates: RatesConfig = Field(default_factory=RatesConfig)
     suite: str = "generic"
     sensors: dict[str, Figure] = Field(default_factory=dict)
+    turn_table: bool = False
     files: dict[str, str] = Field(default_factory=dict)
     faults: tuple[str, ...] = ()
     air: AirConfig = Field(default_factory=AirConfig)
-    start: Annotated[InFlightStart | HandThrowStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
+    start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
     box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
     box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
@@ -141,6 +162,12 @@ class FlightConfig(_Model):
     def _typed_faults(cls, faults: Any) -> Any:
         return typed_faults(faults)
 
+    @model_validator(mode="after")
+    def _calm_indoors(self) -> "FlightConfig":
+        if isinstance(self.start, BenchStart) and not self.air.calm:
+            raise ValueError("air: it rests on a table indoors, where no air moves; leave wind, gusts and the rest out")
+        return self
+
     @property
     def heading_deg(self) -> float:
         """Heading at the start; ValueError where it has not been drawn yet."""
@@ -151,8 +178,18 @@ class FlightConfig(_Model):
 
     @property
     def held_s(self) -> float:
-        """From power-up to the release."""
-        return self.start.hold_s + self.start.push_s if isinstance(self.start, HandThrowStart) else 0.0
+        """From power-up to the release; on a table, to the end of the calibration."""
+        match self.start:
+            case HandThrowStart(hold_s=hold_s, push_s=push_s):
+                return hold_s + push_s
+            case BenchStart(calibration_s=calibration_s):
+                return calibration_s
+        return 0.0
+
+    @property
+    def calibration_s(self) -> float:
+        """From power-up, over which the gyro offset is measured; 0 where the flight starts in the air."""
+        return 0.0 if isinstance(self.start, InFlightStart) else self.start.calibration_s
 
 
 def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig:
@@ -177,7 +214,10 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
             _put(data, _full_name(name, config), value)
     changed = validated(FlightConfig, data)
     # Refuses a suite, a value or a fault that cannot be.
-    require_faults_possible(changed.faults, suite_params(changed.suite, changed.sensors, changed.files))
+    fitted = suite_params(changed.suite, changed.sensors, changed.files)
+    require_faults_possible(changed.faults, fitted)
+    if changed.turn_table and fitted.magnetometer is None:
+        raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed
 
 
@@ -252,7 +292,7 @@ def _resolve_rates(config: FlightConfig) -> RatesConfig:
 
 
 def _resolve_start(config: FlightConfig) -> Any:
-    start: InFlightStart | HandThrowStart = config.start
+    start: AnyStart = config.start
     if start.heading_deg == "random":
         heading_deg = 360.0 * float(stream(config.seed, config.flight, "start_heading").random())
         start = start.model_copy(update={"heading_deg": heading_deg})
