@@ -13,7 +13,7 @@ from typing import Any
 from scenarios.harness.flight import Maker, fly_scenario
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
-from sim.log import Flight
+from sim.log import Flight, Outcome
 
 KEPT = 64  # flights: of a minute each, 150 MB
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -43,6 +43,10 @@ def flights(
     scenario    a name, or one of one's own that is made once, at the head of a module
     changes     fields of the configuration by dotted names, see `config.override`
     estimator   as `fly_scenario` takes it; None is the scenario's own
+
+    Raises
+    ------
+    ValueError          as `fly_scenario` does      KeyboardInterrupt   Ctrl-C ended a flight
     """
     flown = find(scenario) if isinstance(scenario, str) else scenario
     key = scenario if isinstance(scenario, str) else id(scenario)
@@ -54,6 +58,8 @@ def flights(
 def _fly(wanted: _Wanted) -> Flight:
     scenario, changes = wanted.made_of
     flight = fly_scenario(scenario, changes, seed=wanted.seed, estimator=wanted.estimator)
+    if flight.outcome == Outcome.INTERRUPTED:
+        raise KeyboardInterrupt  # nothing is concluded from half a flight
     for rows in (flight.log.truth, flight.log.measured, flight.log.flown):
         rows.flags.writeable = False
     return flight
