@@ -276,9 +276,8 @@ def claims(
                 )
         claim_report.write_all(findings, markdown, folder)
         report(findings.to_json())
-        claim_report.tell(
-            findings, detailed=bool(names) and len(wanted) == 1
-        )  # last: a reader who closes the pipe loses no file
+        # Last: a reader who closes the pipe loses no file.
+        claim_report.tell(findings, detailed=bool(names) and len(wanted) == 1)
     return findings.exit_code
 
 
