@@ -33,7 +33,8 @@ MINUTE_S = 60.0
 GYROS = {"generic": "generic", "devboard_green": "ADXRS401", "devboard_red": "LISY300AL"}
 AUTHORS = ("devboard_green", "devboard_red")  # what the authors' own boards carry
 TURN = SteadyTurn(math.radians(30.0))
-SWAYING = HandHeld(math.radians(30.0))
+SWAYING = HandHeld(math.radians(10.0))
+BACKED: dict[str, Any] = {"bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5}, "zorder": 5}
 
 
 def _at_power_up(suite: str, seed: int, motion: Motion = Rest()) -> ImuSample:  # noqa: B008 - it is frozen
@@ -67,7 +68,7 @@ def _drift(seeds: Sequence[int]) -> Finding:
             at = np.arange(len(cases)) + 0.26 * (i - 1)
             heights = [drift[suite, case] for case in cases]
             bars = ax.bar(at, heights, 0.24, color=colour, label=GYROS[suite])
-            ax.bar_label(bars, [f"{height:.1f}" for height in heights], padding=2, fontsize=8.5)
+            ax.bar_label(bars, [f"{height:.1f}" for height in heights], padding=2, fontsize=8.5, **BACKED)
         ax.axhline(FEW_DEG, color=RED, lw=1, ls="--", label="a few degrees")
         ax.set_yscale("log")
         ax.set_ylim(0.5, 800.0)
@@ -85,8 +86,8 @@ def _drift(seeds: Sequence[int]) -> Finding:
         condition="if the offset was measured at power-up, flying straight",
         under=lines("offset measured"),
         told=f"The authors' own gyros: as delivered they drift by {raw:.0f} degrees per axis in a minute; with the "
-        f"offset measured in two seconds at rest by {worst:.1f}, most of it for they warm up; and by {circling:.0f} when "
-        "the minute is flown in a circle, where errors of gain add up.",
+        f"offset measured in two seconds at rest by {worst:.1f}, most of it because they warm up; and by {circling:.0f} "
+        "when the minute is flown in a circle, where errors of gain add up.",
         seeds=len(seeds),
         draw=draw,
     )
@@ -114,7 +115,8 @@ def _power_up(seeds: Sequence[int]) -> Finding:
             ax.bar_label(bars, [f"{value:.2f}" for value in values], padding=2, fontsize=8.5)
         ax.set_xticks(range(len(GYROS)), list(GYROS.values()))
         ax.grid(visible=False, axis="x")
-        ax.legend()
+        ax.set_ylim(0.0, 9.5)
+        ax.legend(ncols=3, loc="upper left")
         label(ax, "", "offset left, deg/s, RMS")
 
     return Finding(
@@ -123,7 +125,7 @@ def _power_up(seeds: Sequence[int]) -> Finding:
             for name, left, of in zip(GYROS.values(), rested, delivered, strict=True)
         ),
         told=f"Of {delivered.max():.1f} deg/s at most {rested.max():.2f} are left after two seconds at rest. In a hand "
-        f"that sways at up to 30 deg/s it is {swayed.max():.1f}: that much of the sway is taken for offset.",
+        f"that sways at up to 10 deg/s it is {swayed.max():.1f}: that much of the sway is taken for offset.",
         seeds=len(seeds),
         draw=draw,
     )
@@ -151,8 +153,8 @@ def _gain(_seeds: Sequence[int]) -> Finding:
         for i, (name, colour) in enumerate((("y", ORANGE), ("z", BLUE))):
             rates.plot(t_s, learnt[:, i + 1], color=colour, label=f"learnt, {name} gyro")
             rates.axhline(predicted[i + 1], color=colour, ls="--", lw=1)
-        rates.annotate("dashed: a tenth of the true rate", (140.0, 0.25), color=FAINT)
-        rates.legend(loc="center right")
+        rates.annotate("dashed: a tenth of the true rate", (120.0, 0.65), color=FAINT)
+        rates.legend(loc="lower right")
         label(rates, "time in the turn, s", "offset, deg/s")
         angle.plot(t_s, left, color=FAINT, label="without the integral term")
         angle.plot(t_s, error, color=BLUE, label="with it")
@@ -284,7 +286,7 @@ def _sensitivity(seeds: Sequence[int]) -> Finding:
     dear, cheap = (rms(values) for values in each.values())
 
     def draw(figure: Figure) -> None:
-        (ax,) = axes(figure, "Turns in wind: inclination error with sensitive gyros and with cheap ones")
+        (ax,) = axes(figure, "Turns in wind: inclination error with sensitive and less sensitive gyros")
         for i, ((gyro, values), colour) in enumerate(zip(each.items(), (ORANGE, BLUE), strict=True)):
             bars = ax.bar(np.arange(len(seeds)) + 0.38 * (i - 0.5), values, 0.36, color=colour, label=gyro)
             ax.bar_label(bars, [f"{value:.1f}" for value in values], padding=2, fontsize=8.5)
