@@ -85,9 +85,9 @@ def _drift(seeds: Sequence[int]) -> Finding:
         stands=lines("as delivered"),
         condition="if the offset was measured at power-up, flying straight",
         under=lines("offset measured"),
-        told=f"The authors' own gyros drift by {raw:.0f} degrees per axis in a minute as delivered, by {worst:.1f} with "
-        f"the offset measured in two seconds at rest (they warm up), and by {circling:.0f} in a circle, where errors of "
-        "gain add up.",
+        told=f"The authors' own gyros drift by {raw:.0f} degrees per axis in a minute as delivered, by "
+        f"{worst:.1f} with the offset measured in two seconds at rest (they warm up), and by {circling:.0f} in a "
+        "circle, where errors of gain add up.",
         seeds=len(seeds),
         draw=draw,
     )
