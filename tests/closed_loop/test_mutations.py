@@ -20,7 +20,7 @@ NO_LAG_FILTER = {"estimator_params.gps_lag_filter": "false", "estimator_params.r
 WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
-UNAWARE = {"estimator_params.gps_latency_s": 0.3}
+UNAWARE = {"suits.gps_latency_s": 0.3}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 
 
