@@ -39,6 +39,7 @@ MUTATIONS = (
     Mutation("circle", "premerlani", NO_LAG_FILTER, "heading error RMS"),
     Mutation("crosswind", "gyro_only", {}, "inclination error RMS"),
     Mutation("crosswind", "premerlani", NO_YAW, "heading error RMS"),
+    Mutation("crosswind_strong", "premerlani", NO_YAW, "heading error RMS"),
     Mutation("faults", "accelerometer_only", {}, "survived"),
     Mutation("faults", "premerlani", TRUSTS_FORCE, "inclination error, accelerometer stuck"),
     Mutation("gentle_lady_launch", "premerlani", NO_YAW, "heading within 15 deg for good"),
