@@ -127,6 +127,8 @@ class FlightConfig(_Model):
 
     estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
     estimator_params : fields of the estimator's parameter dataclass
+    suits : what is known of the instruments aboard, by the names of such fields, ``{"gps_latency_s": 1.0}``; told to
+    any estimator that has a field of that name
     duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
     changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
     turn_table : the magnetometer was turned on a table before the flight: an estimator that has a parameter
@@ -141,6 +143,7 @@ class FlightConfig(_Model):
     aircraft: str = "endurance"
     estimator: str = "premerlani"
     estimator_params: dict[str, Any] = Field(default_factory=dict)
+    suits: dict[str, float] = Field(default_factory=dict)
     autopilot: str = "dcm"
     duration_s: float = Field(default=60.0, gt=0.0, le=36000.0)
     rates: RatesConfig = Field(default_factory=RatesConfig)
@@ -227,7 +230,7 @@ def _full_name(name: str, config: FlightConfig) -> str:
     fields = dotted_fields(fitted)
     if name in fields:
         return f"sensors.{name}"
-    open_ended = name.startswith("estimator_params.")  # the estimator's own dataclass checks these
+    open_ended = name.startswith(("estimator_params.", "suits."))  # the estimator's own dataclass checks these
     known = [*_dotted(config), *(f"sensors.{f}" for f in fields), "wind"]
     if name not in known and not open_ended:
         require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
@@ -243,7 +246,7 @@ def _dotted(config: FlightConfig) -> list[str]:
             names += [f"{name}.{inner}" for inner in type(value).model_fields if inner != "kind"]
         elif name == "manoeuvre":
             names += [f"{name}.{inner}" for inner in value]
-        elif name not in ("sensors", "estimator_params", "files"):
+        elif name not in ("sensors", "estimator_params", "suits", "files"):
             names.append(name)
     return names
 

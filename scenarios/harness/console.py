@@ -58,7 +58,9 @@ def note_left_out(scenarios: Sequence[str]) -> None:
     """Say which scenarios are not flown with an estimator of one's own, on one line of standard error."""
     if scenarios:
         names = ", ".join(scenarios)
-        err().print(f"left out: {names}: they pass where their own estimator fails", style="dim", soft_wrap=True)
+        err().print(
+            f"left out (passing where the scenario's own estimator fails): {names}", style="dim", soft_wrap=True
+        )
 
 
 def warn_of_faults(scenario: str, config: "FlightConfig") -> None:

@@ -19,7 +19,7 @@ from scenarios.harness.config import (
 )
 from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, with_params
+from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, suited, with_params
 from scenarios.harness.scenario import Scenario
 from sim.events import events_of_faults
 from sim.clock import Rates
@@ -76,7 +76,7 @@ def fly_config(
     """
     config = resolve(config) if maker is not None else with_compass(resolve(config))
     rates = config.rates.build()
-    estimator = maker() if maker is not None else _estimator(config)
+    estimator = maker() if maker is not None else estimator_of(config)
     pilot = load_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft)
     script = scenario.script(config)
     plant = plant_of(config, rates)
@@ -147,7 +147,8 @@ def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _estimator(config: FlightConfig) -> AttitudeEstimator:
-    """The estimator by name, its parameter dataclass changed where the configuration says so."""
+def estimator_of(config: FlightConfig) -> AttitudeEstimator:
+    """The estimator by name, told what suits its instruments, its parameters changed as the configuration says."""
     estimator = load_estimator(config.estimator)
-    return with_params(estimator, config.estimator, config.estimator_params)
+    params = {**suited(estimator, config.suits), **config.estimator_params}
+    return with_params(estimator, config.estimator, params)

@@ -20,7 +20,7 @@ NO_LAG_FILTER = {"estimator_params.gps_lag_filter": "false", "estimator_params.r
 WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
-UNAWARE = {"estimator_params.gps_latency_s": 0.3}
+UNAWARE = {"suits.gps_latency_s": 0.3}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 
 
@@ -39,6 +39,7 @@ MUTATIONS = (
     Mutation("circle", "premerlani", NO_LAG_FILTER, "heading error RMS"),
     Mutation("crosswind", "gyro_only", {}, "inclination error RMS"),
     Mutation("crosswind", "premerlani", NO_YAW, "heading error RMS"),
+    Mutation("crosswind_strong", "premerlani", NO_YAW, "heading error RMS"),
     Mutation("faults", "accelerometer_only", {}, "survived"),
     Mutation("faults", "premerlani", TRUSTS_FORCE, "inclination error, accelerometer stuck"),
     Mutation("gentle_lady_launch", "premerlani", NO_YAW, "heading within 15 deg for good"),

@@ -180,7 +180,7 @@ def test_gps_latency_is_harmless_where_the_estimator_is_told():
 
 
 def test_hand_launch_with_the_accelerometer_alone_dives_because_it_believes_to_climb():
-    """The elevator is down and the nose falls while the estimate tells of a climb; the hand is that of `hand_launch`."""
+    """The elevator is down and the nose falls while the estimate tells of a climb; the hand is `hand_launch`'s."""
     flight = flown("hand_launch_accelerometer", 0, None)
     falling = flight.log.truth[-25:-5]  # half a second, ending a tenth before the ground
     believed = flight.log.flown[-25:-5]

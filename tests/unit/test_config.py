@@ -18,6 +18,7 @@ from scenarios.harness.config import (
     resolve,
 )
 from scenarios.harness.fitted import suite_params
+from scenarios.harness.flight import estimator_of
 from sim.clock import Rates
 from sim.params import changed
 from sim.sensors.suite import SUITES
@@ -224,3 +225,15 @@ def test_heading_before_it_is_drawn_is_refused():
     """Nobody reads a random heading by mistake."""
     with pytest.raises(ValueError, match="resolve the configuration first"):
         _ = FlightConfig(start=InFlightStart()).heading_deg
+
+
+def test_what_suits_the_instruments_is_told_to_whoever_has_a_parameter_for_it():
+    """And to nobody else; a parameter that is set by name is stronger."""
+    config = override(CROSS, {"suits.gps_latency_s": "3", "duration_s": "0.1"})
+    assert config.suits == {"gps_latency_s": 3.0}
+    assert estimator_of(config).params.gps_latency_s == 3.0
+    assert estimator_of(override(config, {"estimator": "ins_ekf"})).params.gps_latency_s == 3.0
+    assert estimator_of(override(config, {"estimator_params.gps_latency_s": 1.0})).params.gps_latency_s == 1.0
+    assert not hasattr(estimator_of(override(config, {"estimator": "gyro_only"})), "params")
+    with pytest.raises(ValueError, match=r"suits.gps_latency_s = 'soon'"):
+        override(CROSS, {"suits.gps_latency_s": "soon"})
