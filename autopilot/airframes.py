@@ -9,9 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from autopilot.failsafe import FailsafeParams
 from autopilot.guidance import GuidanceParams
 from autopilot.launch import LaunchParams
 from autopilot.mixer import MixerParams
+from autopilot.route import RouteParams
 from autopilot.stabilise import StabiliseParams
 
 
@@ -23,6 +25,8 @@ class AutopilotParams:
     guidance: GuidanceParams = field(default_factory=GuidanceParams)
     launch: LaunchParams = field(default_factory=LaunchParams)
     mixer: MixerParams = field(default_factory=MixerParams)
+    route: RouteParams = field(default_factory=RouteParams)
+    failsafe: FailsafeParams = field(default_factory=FailsafeParams)
 
 
 # Steeper than the best glide (6.3 m/s, pitch -2.6 degrees): nobody measures the airspeed, and an estimate that reads
@@ -67,6 +71,12 @@ _GENTLE_LADY = AutopilotParams(
     ),
     launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),
     mixer=MixerParams(elevator_trim=-0.12, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
+    failsafe=FailsafeParams(
+        glide_pitch_rad=_GLIDE_PITCH_RAD,
+        low_height_m=10.0,  # it cannot climb: it lands, with wings near to level
+        safe_height_m=15.0,
+        low_bank_rad=math.radians(5.0),
+    ),
 )
 
 AIRFRAMES: Mapping[str, AutopilotParams] = MappingProxyType(

@@ -4,13 +4,23 @@ What a manoeuvre is judged by must not depend on what the estimator believed or 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.interface import Array
-from scenarios.harness.metrics import Measured, Metric, Moment, SeriesOf, highest, settled_after_s, time_s
+from scenarios.harness.metrics import (
+    Measured,
+    Metric,
+    Moment,
+    Series,
+    SeriesOf,
+    bank_size_deg,
+    highest,
+    settled_after_s,
+    time_s,
+)
 from sim.log import Flight
 
 
@@ -53,6 +63,22 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last index of every run of True."""
     edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
     return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+
+
+def while_banked(series: SeriesOf, steeper_deg: float) -> SeriesOf:
+    """`series`, judged only where the true bank is at least `steeper_deg` to either side."""
+
+    def banked(flight: Flight) -> Series:
+        whole = series(flight)
+        return replace(whole, judged=whole.judged & (np.abs(np.degrees(bank_rad(flight))) >= steeper_deg))
+
+    return banked
+
+
+def time_banked_s(steeper_deg: float, from_: Moment) -> Metric:
+    """Metric: for how long in all, from `from_` on, the true bank was at least `steeper_deg` to either side, s."""
+    steep = while_banked(bank_size_deg, steeper_deg)
+    return lambda flight: Measured(len(steep(flight).within(from_(flight), math.inf).judged_values) * flight.dt_s)
 
 
 def slowest_recovery(series: SeriesOf, limit: float, turns: int, within_s: float) -> Metric:

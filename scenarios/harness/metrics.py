@@ -175,6 +175,15 @@ def bank_size_deg(flight: Flight) -> Series:
     return _series(flight, np.degrees(np.abs(np.arctan2(R[:, 2, 1], R[:, 2, 2]))))
 
 
+def believed_pitch_deg(flight: Flight) -> Series:
+    """Estimated pitch angle, degrees."""
+    return _series(flight, _pitch_deg(flight.log.flown["R_eb"]))
+
+
+def _pitch_deg(R_eb: Array) -> Array:
+    return np.degrees(np.arcsin(np.clip(-R_eb[:, 2, 0], -1.0, 1.0)))
+
+
 def angle_of_attack_deg(flight: Flight) -> Series:
     """True angle of attack, degrees."""
     return _series(flight, np.degrees(flight.log.truth["alpha_rad"]))
@@ -188,6 +197,11 @@ def start(flight: Flight) -> float:  # noqa: ARG001 - a Moment like any other
 def end(flight: Flight) -> float:
     """The planned end of the flight."""
     return planned_end_s(flight)
+
+
+def last(flight: Flight) -> float:
+    """The last tick that was flown, planned or not."""
+    return float(time_s(flight)[-1]) if len(flight.log) else math.nan
 
 
 def at(t_s: float) -> Moment:
@@ -280,6 +294,18 @@ def settling(series: SeriesOf, limit: float, from_: Moment = start, to: Moment =
 def survived(flight: Flight) -> Measured:
     """Metric: 1 where the flight lasted as long as planned, 0 where it ended in any other way."""
     return Measured(float(flight.outcome == Outcome.COMPLETED))
+
+
+def ground_contact_s(flight: Flight) -> Measured:
+    """Metric: when it hit the ground, s after the release; nothing where it did not."""
+    return Measured(last(flight)) if flight.outcome == Outcome.GROUND_CONTACT else NOTHING
+
+
+def pitch_at_ground_deg(flight: Flight) -> Measured:
+    """Metric: true pitch as it hit the ground, degrees; nothing where it did not."""
+    if flight.outcome != Outcome.GROUND_CONTACT or not len(flight.log):
+        return NOTHING
+    return Measured(float(_pitch_deg(flight.log.truth["R_eb"])[-1]))
 
 
 def height_at_m(t_s: float) -> Metric:

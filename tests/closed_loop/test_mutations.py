@@ -2,7 +2,7 @@
 
 Each row of the table is a scenario and what breaks it: a baseline, or the default estimator with one idea of the
 paper taken out; and the check that must notice.  The unbroken estimator passes the same seeds in `test_scenarios`.
-For `gps_latency`, whose point is a failure, it is the cure that must fail.
+Where the point of a scenario is a failure, it is the cure that must fail.
 """
 
 from typing import NamedTuple
@@ -20,6 +20,7 @@ NO_LAG_FILTER = {"estimator_params.gps_lag_filter": "false", "estimator_params.r
 WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
+UNAWARE = {"estimator_params.gps_latency_s": 0.3}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 
 
@@ -41,8 +42,19 @@ MUTATIONS = (
     Mutation("faults", "accelerometer_only", {}, "survived"),
     Mutation("faults", "premerlani", TRUSTS_FORCE, "inclination error, accelerometer stuck"),
     Mutation("gentle_lady_launch", "premerlani", NO_YAW, "heading within 15 deg for good"),
+    Mutation("gentle_lady_launch_calm", "premerlani", NO_YAW, "heading within 15 deg for good"),
+    Mutation("gentle_lady_launch_cross_wind", "premerlani", NO_YAW, "heading within 15 deg for good"),
+    Mutation("gentle_lady_launch_gust", "premerlani", TRUSTS_FORCE, "inclination error RMS"),
+    Mutation("gentle_lady_launch_head_wind", "gyro_only", {}, "heading within 15 deg for good"),
     Mutation("gentle_lady_return", "gyro_only", {}, "inclination error RMS"),
     Mutation("gps_latency", "premerlani", TOLD_THE_LATENCY, "heading error RMS, to be large"),
+    Mutation("gps_latency_ms_200", "premerlani", NO_YAW, "heading error RMS"),
+    Mutation("gps_latency_s_1", "premerlani", NO_LAG_FILTER, "heading error RMS"),
+    Mutation(
+        "gps_latency_s_3", "premerlani", {"estimator_params.gps_latency_s": 3.0}, "heading error RMS, to be large"
+    ),
+    Mutation("gps_latency_told_12", "premerlani", UNAWARE, "heading error RMS"),
+    Mutation("gps_latency_told_3", "premerlani", UNAWARE, "heading error RMS"),
     Mutation("gps_outage", "gyro_only", {}, "survived"),
     Mutation("gps_outage", "premerlani", NO_OFFSET, "inclination error RMS without fixes"),
     Mutation("gyro_gain", "gyro_only", {}, "heading error RMS"),
@@ -51,10 +63,19 @@ MUTATIONS = (
     Mutation("gyro_saturation", "gyro_only", {}, "survived"),
     Mutation("gyro_saturation", "premerlani", WEAK_FEEDBACK, "inclination within 15 deg for good"),
     Mutation("hand_launch", "accelerometer_only", {}, "survived"),
+    Mutation("hand_launch_accelerometer", "premerlani", {}, "pitch when it hits the ground"),
+    Mutation("hand_launch_calm", "premerlani", TRUSTS_FORCE, "survived"),
+    Mutation("hand_launch_cross_wind", "premerlani", NO_YAW, "heading within 15 deg for good"),
+    Mutation("hand_launch_gust", "accelerometer_only", {}, "survived"),
+    Mutation("hand_launch_head_wind", "gyro_only", {}, "heading within 15 deg for good"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("turns_180", "accelerometer_only", {}, "survived"),
     Mutation("turns_180", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
+    Mutation("turns_180_bank_30", "premerlani", WEAK_FEEDBACK, "inclination error RMS while banked"),
+    Mutation("turns_180_bank_45", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
+    Mutation("turns_180_bank_60", "premerlani", TRUSTS_FORCE, "inclination error RMS while banked"),
+    Mutation("turns_180_bank_60", "premerlani", {"manoeuvre.bank_deg": 45.0}, "banked by 54 deg or more"),
 )
 
 

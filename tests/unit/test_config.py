@@ -33,6 +33,8 @@ CROSS = FlightConfig(air=AirConfig(wind_m_s=5.0, wind_from_deg="cross"), manoeuv
         (" 2.5@0 ", Wind(2.5, 0.0)),
         ("5@random", Wind(5.0, "random")),
         ("5@CROSS", Wind(5.0, "cross")),
+        ("5@head", Wind(5.0, "head")),
+        ("5@tail", Wind(5.0, "tail")),
         ("0", Wind(0.0, 0.0)),
         ("calm", Wind(0.0, 0.0)),
     ],
@@ -156,6 +158,17 @@ def test_resolve_of_cross_wind_is_square_to_the_heading_from_both_sides():
         config = resolve(override(CROSS, {"seed": seed}))
         sides.add(round((config.air.wind_from_deg - config.heading_deg) % 360.0, 6))
     assert sides == {90.0, 270.0}
+
+
+@pytest.mark.parametrize(("word", "beside_deg"), [("head", 0.0), ("tail", 180.0)])
+def test_resolve_of_head_and_tail_wind_is_along_the_heading(word, beside_deg):
+    """Wherever the nose points by chance: a head wind comes from there, a tail wind from behind."""
+    for seed in range(5):
+        config = resolve(override(THROW, {"wind": f"5@{word}", "seed": seed}))
+        beside = (config.air.wind_from_deg - config.heading_deg - beside_deg + 180.0) % 360.0 - 180.0
+        assert beside == pytest.approx(0.0, rel=0, abs=1e-9)
+        assert 0.0 <= config.air.wind_from_deg < 360.0
+        assert resolve(config) == config
 
 
 def test_resolve_draws_headings_and_winds_uniformly_and_apart():
