@@ -1,9 +1,9 @@
 """Ten minutes at rest on a table: the ground test of Dilshad and Jahan.
 
 =============  ===================================================================================================
-Story          The board lies on a table, a little askew, somewhere indoors where the GPS finds nothing.  The gyro offsets
-               are measured over the first 2 s; then the parts warm up by 8 K, and the offsets go with it, by more than
-               1 deg/s.  Nothing moves for ten minutes: whatever the estimate does is wrong.
+Story          The board lies on a table, a little askew, somewhere indoors where the GPS finds nothing.  The gyro
+               offsets are measured over the first 2 s; then the parts warm up by 8 K, and the offsets go with it, by
+               more than 1 deg/s.  Nothing moves for ten minutes: whatever the estimate does is wrong.
 Verifies       Dilshad & Jahan, section V, figure 10: once calibrated "roll and pitch stay zero after some random
                fluctuations for a few seconds", and with the magnetometer (``bench_rest_magnetometer``, their estimator)
                yaw is "static with a very little value".  They give no figures.  Premerlani & Bizard: the integral

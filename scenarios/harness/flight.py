@@ -21,8 +21,8 @@ from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, suited, with_params
 from scenarios.harness.scenario import Scenario
-from sim.events import events_of_faults
 from sim.clock import Rates
+from sim.events import events_of_faults
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Flight, Log
 from sim.loop import Watch, fly
@@ -104,8 +104,9 @@ def plant_of(config: FlightConfig, rates: Rates) -> Plant:
     """What flies under a resolved configuration: the aeroplane in its air, or what lies on a table."""
     start = config.start
     if isinstance(start, BenchStart):
-        attitude_rad = (math.radians(deg) for deg in (start.roll_deg, start.pitch_deg, config.heading_deg))
-        return PrescribedPlant(Rest(*attitude_rad, start.height_m), rates, release_s=start.calibration_s)
+        roll_rad, pitch_rad, heading_rad = _radians((start.roll_deg, start.pitch_deg, config.heading_deg))
+        rest = Rest(roll_rad, pitch_rad, heading_rad, start.height_m)
+        return PrescribedPlant(rest, rates, release_s=start.calibration_s)
     return JsbsimPlant(
         config.aircraft,
         start=start_of(config),

@@ -21,6 +21,7 @@ WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
 UNAWARE = {"suits.gps_latency_s": 0.3}
+UNTURNED = {"turn_table": False}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 
 
@@ -34,9 +35,19 @@ class Mutation(NamedTuple):
 
 
 MUTATIONS = (
+    Mutation("bench_rest", "gyro_only", {}, "inclination error RMS"),
+    Mutation("bench_rest", "accelerometer_only", {}, "offset across the vertical not learnt"),
+    Mutation("bench_rest", "premerlani", NO_OFFSET, "offset across the vertical not learnt"),
+    Mutation("bench_rest_magnetometer", "dilshad", UNTURNED, "heading error at its worst"),
+    Mutation("bench_rest_magnetometer", "premerlani", {}, "heading, standard deviation"),
     Mutation("circle", "accelerometer_only", {}, "survived"),
     Mutation("circle", "gyro_only", {}, "heading error RMS"),
     Mutation("circle", "premerlani", NO_LAG_FILTER, "heading error RMS"),
+    Mutation("cold_start", "gyro_only", {}, "survived"),
+    Mutation("cold_start", "premerlani", NO_OFFSET, "offset not learnt"),
+    Mutation("cold_start_moved", "accelerometer_only", {}, "survived"),
+    Mutation("cold_start_moved", "premerlani", NO_OFFSET, "inclination within 6 deg for good"),
+    Mutation("cold_start_no_gps", "premerlani", NO_YAW, "heading within 15 deg for good"),
     Mutation("crosswind", "gyro_only", {}, "inclination error RMS"),
     Mutation("crosswind", "premerlani", NO_YAW, "heading error RMS"),
     Mutation("crosswind_strong", "premerlani", NO_YAW, "heading error RMS"),
@@ -69,6 +80,14 @@ MUTATIONS = (
     Mutation("hand_launch_cross_wind", "premerlani", NO_YAW, "heading within 15 deg for good"),
     Mutation("hand_launch_gust", "accelerometer_only", {}, "survived"),
     Mutation("hand_launch_head_wind", "gyro_only", {}, "heading within 15 deg for good"),
+    Mutation("iron", "gps_velocity_magnetometer", UNTURNED, "heading error of the nose RMS"),
+    Mutation("iron", "gyro_only", {}, "heading error of the nose RMS"),
+    Mutation(
+        "iron_uncalibrated",
+        "gps_velocity_magnetometer",
+        {"turn_table": True},
+        "heading error of the nose, to be large",
+    ),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("turns_180", "accelerometer_only", {}, "survived"),
