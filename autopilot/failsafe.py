@@ -47,7 +47,8 @@ class FailsafeParams:
     """When a failsafe takes over, and how it flies; the defaults fly the aeroplane `endurance`.
 
     gps_lost_s : silence after which the GPS counts as lost; longer than the pause between fixes of a slow receiver
-    gps_back_s : time for which fixes must have come again
+    gps_back_s : time for which fixes must have come again, with pauses of half that silence at most; longer than such
+        a pause, so that one fix alone is not taken for a GPS
     circle_s : of the circle at cruise, before the motor is switched off
     bank_rad : of the circle         glide_pitch_rad : of the glide, motor off
     unhealthy_s : an estimator that is POOR for so long is not believed, one that is GOOD for so long is again
@@ -56,7 +57,7 @@ class FailsafeParams:
     """
 
     gps_lost_s: float = 3.0
-    gps_back_s: float = 1.0
+    gps_back_s: float = 2.0
     circle_s: float = 30.0
     bank_rad: float = math.radians(10.0)
     glide_pitch_rad: float = math.radians(-4.0)
@@ -77,8 +78,10 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
     for i in range(3):  # a fix of no numbers is none
         arrived = arrived and math.isfinite(row.gps_p_e_m[i]) and math.isfinite(row.gps_v_e_m_s[i])
     s.silent_s = 0.0 if arrived or row.gps_valid == 0 else s.silent_s + dt_s
-    s.heard_s = 0.0 if s.silent_s > p.gps_lost_s else s.heard_s + dt_s
-    if s.heard_s >= p.gps_back_s:
+    heard = s.heard_s >= p.gps_back_s
+    patience_s = p.gps_lost_s if heard else 0.5 * p.gps_lost_s
+    s.heard_s = 0.0 if s.silent_s > patience_s else s.heard_s + dt_s
+    if heard:
         s.circled_s = 0.0
 
 
@@ -150,7 +153,7 @@ def mode_in_force(asked, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
         s.low = 1
     elif not height_m < p.safe_height_m:  # also where nobody knows
         s.low = 0
-    return (LOW if s.low or asked.mode == LOW else mode), mode
+    return (LOW if s.low or (asked.mode == LOW and asked.radio) else mode), mode
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import astuple
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -74,9 +75,7 @@ class Receiver:
 
 def turned(bank):
     """Attitude that points north with that bank: only its third row counts."""
-    return np.array(
-        [[1.0, 0.0, 0.0], [0.0, math.cos(bank), -math.sin(bank)], [0.0, math.sin(bank), math.cos(bank)]]
-    )
+    return np.array([[1.0, 0.0, 0.0], [0.0, math.cos(bank), -math.sin(bank)], [0.0, math.sin(bank), math.cos(bank)]])
 
 
 def flown(setpoint, seconds, *, start=0j, heading=0.0, wind=CALM, route=None, wind_known=False):
@@ -232,7 +231,7 @@ def overshoots(at, due, route):
     """Of all legs but the first, turned to by the right: the most that is flown to the left of one, the outside of
     the turn, and the largest distance from one at its end."""
     side, begins = side_of_legs(at, due, route), np.flatnonzero(np.diff(due)) + 1
-    legs = [side[a:b] for a, b in zip(begins, begins[1:], strict=False)]
+    legs = [side[a:b] for a, b in pairwise(begins)]
     return max(-leg.min() for leg in legs), max(abs(leg[-1]) for leg in legs)
 
 
