@@ -6,10 +6,10 @@ Each tick, the first line that applies:
 In force            When                                        What is flown
 ==================  ==========================================  ================================================
 MANUAL, RATE        asked for, and the radio is heard           what the pilot says: nothing below takes it away
-LEVEL               the estimator was healthy once, and calls   wings level at cruise, on the attitude when it was
-                    itself POOR for `unhealthy_s` though the    last healthy, carried on with the raw gyros less
-                    GPS is alive and fresh; until it is GOOD    the offset believed then (Eqn 17)
-                    as long
+LEVEL               the estimator was healthy once, and calls   wings level at the height where it began, on the
+                    itself POOR for `unhealthy_s` though the    attitude when it was last healthy, carried on with
+                    GPS is alive and fresh; until it is GOOD    the raw gyros less the offset believed then (Eqn
+                    as long                                     17); no height, the pitch of cruise
 LAUNCH              asked for, and not over yet, radio or not   as asked
 STABILISE           asked for, and the radio is heard           as asked
 GLIDE               as CIRCLE, for more than `circle_s`         the same circle, motor off, at the pitch of a glide
@@ -158,12 +158,13 @@ def mode_in_force(asked, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def circle(mode, row, s, p, g, dt_s):  # type: ignore[no-untyped-def]
-    """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE and LEVEL: no position, no height.
+    """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE and LEVEL, which go nowhere.
 
-    s : record of the height loop   p, g : records of FailsafeParams, GuidanceParams
+    s : record of the height loop, and the height kept   p, g : records of FailsafeParams, GuidanceParams
     """
     bank_rad = 0.0 if mode == LEVEL else min(p.bank_rad, g.bank_limit_rad)
     if mode == GLIDE:
         return bank_rad, p.glide_pitch_rad, 0.0
-    pitch_rad, throttle = hold_height(math.nan, row, s, g, dt_s)  # no height asked for: level flight at cruise
+    # The climb that the GPS shows holds the pitch that gyros alone would lose; without a height, level flight.
+    pitch_rad, throttle = hold_height(s.height_kept_m if mode == LEVEL else math.nan, row, s, g, dt_s)
     return bank_rad, pitch_rad, throttle
