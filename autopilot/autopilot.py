@@ -69,6 +69,7 @@ _STATE = np.dtype(
         ("R_kept_eb", "f8", (3, 3)),  # attitude of the last healthy estimate, carried on with
         ("bias_kept_b_rad_s", "f8", (3,)),  # its offset of the gyros
         ("omega_kept_b_rad_s", "f8", (3,)),
+        ("height_kept_m", "f8"),  # of the beginning of LEVEL
     ],
     align=True,
 )
@@ -91,11 +92,12 @@ def ask(mode, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def enter(mode, led_by, s):  # type: ignore[no-untyped-def]
+def enter(mode, led_by, height_m, s):  # type: ignore[no-untyped-def]
     """Change to `mode`, led by `led_by`: forget what belongs to the one that is left, keep the trim that was learnt."""
     if mode != s.mode:
         if RATE in (mode, s.mode):
             s.roll_integral = s.pitch_integral = 0.0
+        s.height_kept_m = height_m
         s.mode = mode
     if led_by != s.led_by:
         s.outbound = s.on_leg = 0
@@ -193,7 +195,7 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     height_m = height(row, p.guidance)
     mode, led_by = mode_in_force(asked, height_m, s, p.failsafe, dt_s)
     if mode != s.mode or led_by != s.led_by:
-        enter(mode, led_by, s)
+        enter(mode, led_by, height_m, s)
     s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
     if mode == MANUAL:
         throttle = asked.throttle if math.isfinite(asked.throttle) else 0.0

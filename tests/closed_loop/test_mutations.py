@@ -5,6 +5,7 @@ paper taken out; and the check that must notice.  The unbroken estimator passes 
 Where the point of a scenario is a failure, it is the cure that must fail.
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -23,6 +24,9 @@ NO_YAW = {"estimator_params.w_y": 0}
 UNAWARE = {"suits.gps_latency_s": 0.3}
 UNTURNED = {"turn_table": False}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
+_BROKEN = Path(__file__).with_name("broken_autopilots.py")
+TURNS_AT_THE_CORNER = {"autopilot": f"{_BROKEN}:TurnsAtTheCorner"}
+NEVER_MISSES_THE_GPS = {"autopilot": f"{_BROKEN}:NeverMissesTheGps"}
 
 
 class Mutation(NamedTuple):
@@ -68,7 +72,8 @@ MUTATIONS = (
     Mutation("gps_latency_told_12", "premerlani", UNAWARE, "heading error RMS"),
     Mutation("gps_latency_told_3", "premerlani", UNAWARE, "heading error RMS"),
     Mutation("gps_outage", "gyro_only", {}, "survived"),
-    Mutation("gps_outage", "premerlani", NO_OFFSET, "inclination error RMS without fixes"),
+    Mutation("gps_outage", "premerlani", NEVER_MISSES_THE_GPS, "circled"),
+    Mutation("gps_outage", "premerlani", NO_OFFSET, "inclination error RMS afterwards"),
     Mutation("gyro_gain", "gyro_only", {}, "heading error RMS"),
     Mutation("gyro_gain", "premerlani", NO_OFFSET, "mean error of the corrected yaw rate"),
     Mutation("gyro_offset", "premerlani", NO_OFFSET, "offset not learnt"),
@@ -90,6 +95,8 @@ MUTATIONS = (
     ),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
+    Mutation("turbulence_mission", "premerlani", NO_YAW, "waypoints reached"),
+    Mutation("turbulence_mission", "premerlani", TURNS_AT_THE_CORNER, "off the legs RMS"),
     Mutation("turns_180", "accelerometer_only", {}, "survived"),
     Mutation("turns_180", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
     Mutation("turns_180_bank_30", "premerlani", WEAK_FEEDBACK, "inclination error RMS while banked"),
