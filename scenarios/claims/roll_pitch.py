@@ -19,21 +19,17 @@ from estimator.interface import Array, AttitudeEstimate, Measurements
 from estimator.premerlani import Premerlani, PremerlaniParams
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_motions import felt_at_rest, seen, tilt_deg
+from scenarios.harness.claim_motions import DECLINATION_RAD, felt_at_rest, seen, tilt_deg
 from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import highest, inclination_error_deg, rms, survived, time_s
-from sim import place
 from sim.hover import Hover
 from sim.log import Log
-from sim.magnetic_field import field_e_ut
 from sim.prescribed_plant import Loop, Motion, SteadyTurn
 
 WEIGHT = 0.5  # of the roll-pitch correction, 1/s, for every estimator here
 FILTER_S, LATENCY_S = 1.0, 0.3
 AT_ONCE = {"gps_filter_s": 0.0, "gps_latency_s": 0.0}
 LATE = {"sensors.gps.filter_s": FILTER_S, "sensors.gps.latency_s": LATENCY_S}
-FIELD = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, place.YEAR)
-DECLINATION_RAD = math.atan2(FIELD[1], FIELD[0])
 SETTLED = 1500  # ticks: half a minute
 BANKS_DEG = (20.0, 35.0, 45.0, 50.0, 55.0, 60.0)
 WINDS_M_S = (0.0, 2.5, 5.0, 7.5)
