@@ -180,9 +180,9 @@ def _wave(seeds: Sequence[int]) -> Finding:
             line("wave where there is no GPS, sd", "deg", none, "<=", 0.5),
         ),
         told=f"Where a hovering craft believes its course, the yaw waves by {delayed:.0f} degrees (sd) with the "
-        f"receiver's delay and by {undelayed:.0f} without: what does not travel has no course. Without any GPS it waves "
-        f"by {none:.1f}: the accelerometer does not feel the craft lean, and the dip of the field makes that a heading "
-        f"(perfect sensors: {dipping:.1f}, {level:.2f} in a horizontal field).",
+        f"receiver's delay and by {undelayed:.0f} without: what does not travel has no course. Without any GPS it "
+        f"waves by {none:.1f}: the accelerometer does not feel the craft lean, which the dip of the field makes a "
+        f"heading (perfect sensors: {dipping:.1f}, {level:.2f} in a horizontal field).",
         seeds=len(seeds),
         draw=draw,
     )
