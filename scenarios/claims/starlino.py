@@ -31,7 +31,7 @@ S_G, S_A = 20.0, 1.0  # comment 49
 BOARD = "dilshad_9dof"
 
 
-def _set(estimator: Starlino, R_eb: Array) -> Starlino:
+def set_attitude(estimator: Starlino, R_eb: Array) -> Starlino:
     """The estimator with the attitude `R_eb`."""
     state = estimator.snapshot()
     state["R_eb"], state["dcm"] = R_eb, NED_FROM_NWU @ R_eb
@@ -48,7 +48,8 @@ def _weights(seeds: Sequence[int]) -> Finding:
     ten_s = seen(Rest(), 10.0)
     tilted = np.asarray(Rotation.from_rotvec([0.0, math.radians(10.0), 0.0]).as_matrix())
     gone = {
-        s_g: tilt_deg(_set(six_axes(s_g), tilted).replay(ten_s.measured)["R_eb"], ten_s) for s_g in (5.0, S_G, 80.0)
+        s_g: tilt_deg(set_attitude(six_axes(s_g), tilted).replay(ten_s.measured)["R_eb"], ten_s)
+        for s_g in (5.0, S_G, 80.0)
     }
     samples = int(np.flatnonzero(gone[S_G] < 10.0 / math.e)[0]) + 1
     weights = np.geomspace(2.0, 320.0, 12)
@@ -103,7 +104,9 @@ def _unsteady(axis: Array) -> float:
 def _accelerations(_seeds: Sequence[int]) -> Finding:
     def turned(motion: Motion, lasts_s: float, band: float = 0.2) -> float:
         log = seen(motion, lasts_s)
-        return highest(tilt_deg(_set(six_axes(band=band), log.truth["R_eb"][0]).replay(log.measured)["R_eb"], log))
+        return highest(
+            tilt_deg(set_attitude(six_axes(band=band), log.truth["R_eb"][0]).replay(log.measured)["R_eb"], log)
+        )
 
     def about(bank_deg: float, band: float = 0.2) -> float:
         turn = SteadyTurn(math.radians(bank_deg))

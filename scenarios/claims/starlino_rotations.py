@@ -86,7 +86,7 @@ def _blind_axis(_seeds: Sequence[int]) -> Finding:
 
 def _half_each(_seeds: Sequence[int]) -> Finding:
     cosines = np.geomspace(1e-3, 0.99, 60)
-    left = np.array([_left_of(float(cosine)) for cosine in cosines])
+    left = np.array([left_of(float(cosine)) for cosine in cosines])
     shares = np.linspace(0.0, 1.0, 11)
     off = np.array([_off_after_10_s(float(share)) for share in shares])
 
@@ -114,7 +114,7 @@ def _half_each(_seeds: Sequence[int]) -> Finding:
     )
 
 
-def _left_of(cosine: float) -> float:
+def left_of(cosine: float) -> float:
     """Cosine between two unit vectors after one correction."""
     north, west = orthonormalise((1.0, 0.0, 0.0), (cosine, math.sqrt(1.0 - cosine * cosine), 0.0))
     return float(np.dot(north, west))
