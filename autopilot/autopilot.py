@@ -18,6 +18,7 @@ from autopilot.energy import (
 )
 from autopilot.failsafe import circle, examine, listen, mode_in_force
 from autopilot.guidance import (
+    agility,
     bank_for_heading,
     bank_to_return,
     direction_of_travel,
@@ -63,6 +64,7 @@ _STATE = np.dtype(
         ("airspeed_known", "i8"),  # measured, or from GPS and wind
         ("air_left_s", "f8"),  # for so long the airspeed last measured is believed
         ("airspeed_wanted_m_s", "f8"),
+        ("ground_m_s", "f8"),  # speed over the ground, NaN where nobody knows
         ("headwind_m_s", "f8"),  # against the way to be flown
         ("unseen_turn_rad", "f8"),  # turned, but not yet in the GPS course
         ("outbound", "i8"),  # the launch point was passed and is being left behind
@@ -122,7 +124,7 @@ def reckon_speed(R_eb, wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-de
     s.inverted = me.asked.inverted and s.mode in (STABILISE, COURSE) and math.isfinite(e.inverted_m_s)
     travels = s.led_by in (COURSE, RETURN, LOITER, WAYPOINTS)
     if travels:
-        believe_headwind(R_eb, wind_e_m_s, row, s, me.p, dt_s)
+        believe_headwind(R_eb, wind_e_m_s, row, s, me.on_nose, me.p, dt_s)
     want_airspeed(me.asked, travels, s, e)
     believe_airspeed(wind_e_m_s, row, s, me.p, dt_s)
 
@@ -137,6 +139,8 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
         limit_rad = max(limit_rad, failsafe.bank_rad)
     if s.mode == LOW:
         limit_rad = min(limit_rad, failsafe.low_bank_rad)
+    if not me.on_nose:
+        limit_rad *= agility(s, me.p.energy.airspeed_m_s, p)
     r_zy = -R_eb[2, 1] if s.inverted else R_eb[2, 1]
     if s.led_by == RETURN:
         bank = bank_to_return(north, east, r_zy, row, s, limit_rad, p)

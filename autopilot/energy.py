@@ -116,22 +116,24 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
 
 
 @kernel
-def believe_headwind(R_eb, wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Wind against the nose, m/s, never below 0, in `s.headwind_m_s`; slowly.
+def believe_headwind(R_eb, wind_e_m_s, row, s, on_nose, p, dt_s):  # type: ignore[no-untyped-def]
+    """Speed over the ground now, and slowly the wind against the nose, never below 0, m/s, in `s`.
 
-    From the estimator's wind, where it tells one; else what the ground speed lacks of the airspeed.  Blown back, an
-    aeroplane that steers by its course no longer knows where its nose is: this is felt before.
+    The headwind comes from wind and nose, where the estimator tells both; else it is what the ground speed lacks of
+    the airspeed.  NaN is the speed over the ground that nobody knows.
 
     R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured   p : record of AutopilotParams
+    s : record with `ground_m_s`, `headwind_m_s`, updated
     """
     now_m_s, lag_s = 0.0, gps_age(row, p.guidance)
-    if math.isfinite(wind_e_m_s[0] + wind_e_m_s[1]):
+    s.ground_m_s = math.nan
+    if math.isfinite(lag_s):
+        turned = s.unseen_turn_rad * p.guidance.gps_filter_s / max(lag_s, 1e-3)
+        s.ground_m_s = math.hypot(row.gps_v_e_m_s[0], row.gps_v_e_m_s[1]) * math.hypot(1.0, turned)
+        now_m_s = max(s.airspeed_m_s - s.ground_m_s, 0.0)
+    if on_nose and math.isfinite(wind_e_m_s[0] + wind_e_m_s[1]):
         north, east = unit(R_eb[0, 0], R_eb[1, 0])
         now_m_s = max(-(north * wind_e_m_s[0] + east * wind_e_m_s[1]), 0.0)
-    elif math.isfinite(lag_s):
-        turned = s.unseen_turn_rad * p.guidance.gps_filter_s / max(lag_s, 1e-3)
-        ground_m_s = math.hypot(row.gps_v_e_m_s[0], row.gps_v_e_m_s[1]) * math.hypot(1.0, turned)
-        now_m_s = max(s.airspeed_m_s - ground_m_s, 0.0)
     s.headwind_m_s += dt_s / (p.energy.headwind_filter_s + dt_s) * (now_m_s - s.headwind_m_s)
 
 
