@@ -1,0 +1,94 @@
+"""A vertical climb, then a stall turn.
+
+=============  ===================================================================================================
+Story          Straight and level until everything has settled; a dive for speed, then straight up until little of it is
+               left, and the autopilot brings the nose down.  Half a minute later the same, but the rudder swings the
+               nose round at the top, and it comes down the way it went up and flies back.
+Verifies       Premerlani & Bizard: navigation and control work pointing vertically; where the roll axis is vertical the
+               course says nothing of yaw (Eqn 23 yields zero) and the gyros carry it across
+Aircraft       endurance
+Wind           3 m/s from any direction, turbulence W20 = 3 m/s
+Sensors        generic
+Passes when    it survives and is never below 60 m (from 120 m); it truly pointed within 15 degrees of the vertical for
+               2 s altogether, 0.8 s without a break, and swung round; inclination error at most LIMIT
+=============  ===================================================================================================
+"""
+
+import math
+
+from autopilot.interface import Mode, Setpoint
+from autopilot.manoeuvres import stall_turn, vertical_climb
+from autopilot.pilot import Script, Timed
+from scenarios.harness.checks import SURVIVED, Check
+from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
+from scenarios.harness.manoeuvres import last, longest_s, total_s, turned, vertical
+from scenarios.harness.metrics import (
+    after,
+    at,
+    end,
+    heading_error_deg,
+    height_m,
+    inclination_error_deg,
+    lowest,
+    over,
+    rms,
+)
+from scenarios.harness.scenario import Scenario
+
+FIRST_S = 25.0
+FIRST, OVER = at(FIRST_S), last(vertical)
+
+
+def _script(config: FlightConfig) -> Script:
+    m, course_rad = config.manoeuvre, math.radians(config.heading_deg)
+    out = Setpoint(Mode.COURSE, course_rad=course_rad, height_m=m["height_m"])
+    back = Setpoint(Mode.COURSE, course_rad=course_rad + math.pi, height_m=m["height_m"])
+    up = vertical_climb(FIRST_S, m["climb_s"], out)
+    over_the_top = stall_turn(FIRST_S + m["every_s"], m["climb_s"], back)
+    return Script([Timed(0.0, out), *up.timed, *over_the_top.timed])
+
+
+SCENARIO = Scenario(
+    name="vertical",
+    story=__doc__,
+    config=FlightConfig(
+        duration_s=100.0,
+        start=InFlightStart(height_m=120.0),
+        air=AirConfig(wind_m_s=3.0, wind_from_deg="random", turbulence_w20_m_s=3.0),
+        manoeuvre={"height_m": 120.0, "every_s": 30.0, "climb_s": 1.5},
+    ),
+    script=_script,
+    # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
+    checks=(
+        SURVIVED,
+        Check("straight up", "s", total_s(vertical), 2.0, ">="),
+        Check("straight up without a break", "s", longest_s(vertical), 0.8, ">="),
+        Check("swung round to the right", "turns", turned("z", 1.0), 0.4, ">="),
+        Check("lowest height", "m", over(height_m, lowest, FIRST, end), 60.0, ">="),
+        Check(
+            "inclination error RMS while going up and over",
+            "deg",
+            over(inclination_error_deg, rms, FIRST, after(OVER, 5.0)),
+            8.0,
+            pooled="rms",
+            per_flight_limit=12.0,
+        ),
+        Check(
+            "inclination error RMS afterwards",
+            "deg",
+            over(inclination_error_deg, rms, after(OVER, 10.0), after(OVER, 30.0)),
+            5.0,
+            pooled="rms",
+            per_flight_limit=7.5,
+        ),
+        Check(
+            "heading error RMS afterwards",
+            "deg",
+            over(heading_error_deg(), rms, after(OVER, 15.0), after(OVER, 35.0), judged_share=0.9),
+            10.0,
+            pooled="rms",
+            per_flight_limit=15.0,
+        ),
+    ),
+    milestones={"last straight up": lambda flight: [OVER(flight)]},
+)
