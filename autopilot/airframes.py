@@ -64,6 +64,7 @@ _GENTLE_LADY = AutopilotParams(
         throttle_trim=0.0,
         throttle_per_climb_s_m=0.0,
         throttle_least=0.0,
+        inverted_airspeed_m_s=math.nan,  # the dihedral by which the rudder rolls it would roll it over again
     ),
     launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),
     mixer=MixerParams(elevator_trim=-0.12, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),

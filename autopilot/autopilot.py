@@ -76,11 +76,19 @@ def enter(mode, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def head_up(me):  # type: ignore[no-untyped-def]
+    """1 for upright flight, -1 where the mode in force is to be flown inverted by an aeroplane that can."""
+    on_its_back = me.asked.inverted and (me.s.mode == STABILISE or me.s.mode == COURSE)
+    return -1.0 if on_its_back and math.isfinite(me.p.guidance.inverted_airspeed_m_s) else 1.0
+
+
+@kernel
 def guide(R_eb, wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
     """Bank and pitch demand, rad, and throttle of the modes that hold an attitude; `me` is the memory."""
     asked, s, p = me.asked, me.s, me.p.guidance
+    up = head_up(me)
     if s.mode == STABILISE:
-        return asked.bank_rad, asked.pitch_rad, throttle_for(asked.pitch_rad, p)
+        return asked.bank_rad, asked.pitch_rad, throttle_for(asked.pitch_rad, up, p)
     if s.mode == LAUNCH:
         thrown_s = feel_throw(R_eb, row, s, me.p.launch, dt_s)
         pitch, throttle = climb_away(thrown_s, asked.height_m, row, s, me.p.launch, p, dt_s)
@@ -91,8 +99,8 @@ def guide(R_eb, wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
         bank = bank_to_return(north, east, R_eb[2, 1], row, s, limit_rad, p)
     else:
         sine, cosine = heading_error(north, east, math.cos(asked.course_rad), math.sin(asked.course_rad))
-        bank = bank_for_heading(sine, cosine, R_eb[2, 1], limit_rad, p)
-    pitch, throttle = hold_height(asked.height_m, row, s, p, dt_s)
+        bank = bank_for_heading(sine, cosine, up * R_eb[2, 1], limit_rad, p)
+    pitch, throttle = hold_height(asked.height_m, up, row, s, p, dt_s)
     return bank, pitch, throttle
 
 
@@ -123,15 +131,17 @@ def steer(R_eb, omega_b_rad_s, wind_e_m_s, health, rows, k, memory):  # type: ig
         return asked.aileron, asked.elevator, asked.rudder, throttle, asked.mode, math.nan, math.nan
 
     bank = pitch = math.nan
+    airspeed_m_s = me.p.stabilise.airspeed_m_s
     if s.mode == RATE:
         rate = asked.rate_b_rad_s
         demand = (rate[0], rate[1], rate[2])
         throttle = me.p.guidance.throttle_trim
     else:
         bank, pitch, throttle = guide(R_eb, wind_e_m_s, row, me, dt_s)
-        demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, me.p.stabilise)
+        demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, head_up(me), airspeed_m_s, me.p.stabilise)
     in_hand = s.mode == LAUNCH and s.thrown_s < 0.0
-    control = rate_control(demand, R_eb, omega_b_rad_s, s, me.p.stabilise, 0.0 if in_hand else dt_s)
+    still_s = 0.0 if in_hand else dt_s
+    control = rate_control(demand, R_eb, omega_b_rad_s, airspeed_m_s, s, me.p.stabilise, still_s)
     if math.isfinite(asked.throttle) and not in_hand:
         throttle = asked.throttle
     aileron, elevator, rudder, throttle = mix(control[0], control[1], control[2], throttle, me.p.mixer)

@@ -31,6 +31,9 @@ class GuidanceParams:
     throttle_trim, throttle_per_climb_s_m : for level flight, and per climb rate
     pitch_per_climb_rad_m, pitch_integral_limit_rad : integral of the climb missing, and the most it holds
     throttle_least : keeps air over the tail
+    inverted_airspeed_m_s : of inverted flight, above its stall; NaN: this aeroplane cannot, and stays upright
+    pitch_per_lift_rad : angle of attack per unit of the lift coefficient at cruise
+    throttle_per_speed_s_m, throttle_inverted : for level flight faster than cruise, and for the drag on its back
     """
 
     bank_per_heading: float = 1.2
@@ -51,6 +54,10 @@ class GuidanceParams:
     pitch_per_climb_rad_m: float = 0.01
     pitch_integral_limit_rad: float = math.radians(10.0)
     throttle_least: float = 0.1
+    inverted_airspeed_m_s: float = 14.0
+    pitch_per_lift_rad: float = math.radians(4.6)
+    throttle_per_speed_s_m: float = 0.045
+    throttle_inverted: float = 0.08
 
 
 @kernel
@@ -155,14 +162,29 @@ def height(row, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
+def level_flight(up, p):  # type: ignore[no-untyped-def]
+    """Airspeed, m/s, pitch, rad, and throttle of level flight: at cruise, or inverted (`up` -1).
+
+    The angle of attack goes with the lift coefficient, `up` (V_c / V)^2 in units of that at cruise; on its back the
+    aeroplane flies with the nose as far above the horizon as the wing needs below its own zero.
+    """
+    if up > 0.0:
+        return p.airspeed_m_s, p.pitch_trim_rad, p.throttle_trim
+    v = p.inverted_airspeed_m_s
+    lift = -((p.airspeed_m_s / v) ** 2)
+    throttle = p.throttle_trim + p.throttle_per_speed_s_m * (v - p.airspeed_m_s) + p.throttle_inverted
+    return v, -(p.pitch_trim_rad + p.pitch_per_lift_rad * (lift - 1.0)), throttle
+
+
+@kernel
+def hold_height(height_m, up, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Pitch demand, rad, and throttle, 0..1, that lead slowly to a height and hold it.
 
     Pitch and throttle follow the same climb demand, so that the speed, which nobody measures, stays near
     cruise.  The integral takes up an estimate that is wrong in pitch; were it on the throttle, the speed
     would pay for that error.  Without a height: level flight at cruise.
 
-    height_m : demanded   row : measured   s : record with `climb_integral_rad`, updated
+    height_m : demanded   up : 1 upright, -1 inverted   row : measured   s : record with `climb_integral_rad`, updated
     """
     missing_m = height_m - height(row, p)
     climb_m_s = 0.0
@@ -171,13 +193,15 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
         climb_missing_m_s = clip(climb_m_s + row.gps_v_e_m_s[2], -5.0, 5.0)  # the velocity is down
         integral_rad = s.climb_integral_rad + p.pitch_per_climb_rad_m * climb_missing_m_s * dt_s
         s.climb_integral_rad = clip(integral_rad, -p.pitch_integral_limit_rad, p.pitch_integral_limit_rad)
-    pitch_rad = p.pitch_trim_rad + climb_m_s / p.airspeed_m_s + s.climb_integral_rad
-    throttle = p.throttle_trim + p.throttle_per_climb_s_m * climb_m_s
+    airspeed_m_s, trim_rad, throttle = level_flight(up, p)
+    pitch_rad = trim_rad + climb_m_s / airspeed_m_s + s.climb_integral_rad
+    throttle += p.throttle_per_climb_s_m * climb_m_s
     return clip(pitch_rad, -p.pitch_limit_rad, p.pitch_limit_rad), clip(throttle, p.throttle_least, 1.0)
 
 
 @kernel
-def throttle_for(pitch_rad, p):  # type: ignore[no-untyped-def]
-    """Throttle, 0..1, that goes with a held pitch at about cruise speed: where no height is held."""
-    climb_m_s = p.airspeed_m_s * math.sin(pitch_rad - p.pitch_trim_rad)
-    return clip(p.throttle_trim + p.throttle_per_climb_s_m * climb_m_s, p.throttle_least, 1.0)
+def throttle_for(pitch_rad, up, p):  # type: ignore[no-untyped-def]
+    """Throttle, 0..1, that goes with a held pitch at about the speed of level flight: where no height is held."""
+    airspeed_m_s, trim_rad, throttle = level_flight(up, p)
+    climb_m_s = airspeed_m_s * math.sin(pitch_rad - trim_rad)
+    return clip(throttle + p.throttle_per_climb_s_m * climb_m_s, p.throttle_least, 1.0)

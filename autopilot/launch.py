@@ -62,8 +62,8 @@ def climb_away(thrown_s, height_m, row, s, p, guidance, dt_s):  # type: ignore[n
     if height(row, guidance) > height_m - p.level_off_m:  # False where there is no height
         s.levelled_off = 1
     if s.levelled_off:
-        return hold_height(height_m, row, s, guidance, dt_s)
+        return hold_height(height_m, 1.0, row, s, guidance, dt_s)
     if thrown_s < p.motor_delay_s:
         return p.climb_pitch_rad, 0.0
-    throttle = 1.0 if thrown_s < p.full_throttle_s else throttle_for(p.climb_pitch_rad, guidance)
+    throttle = 1.0 if thrown_s < p.full_throttle_s else throttle_for(p.climb_pitch_rad, 1.0, guidance)
     return p.climb_pitch_rad, throttle

@@ -143,7 +143,7 @@ def test_height_climbing_is_moved_on_by_the_age_of_the_fix():
 )
 def test_hold_height_demands_a_limited_climb(height_m, climb_m_s):
     """Climb per height missing, not above 3 m/s nor below -2 m/s; pitch and throttle follow together."""
-    pitch, throttle = hold_height(height_m, row_of(), state(), record(), 0.0)
+    pitch, throttle = hold_height(height_m, 1.0, row_of(), state(), record(), 0.0)
     expected = PARAMS.pitch_trim_rad + climb_m_s / PARAMS.airspeed_m_s
     np.testing.assert_allclose(pitch, min(expected, PARAMS.pitch_limit_rad), rtol=0, atol=1e-12)
     wanted = PARAMS.throttle_trim + PARAMS.throttle_per_climb_s_m * climb_m_s
@@ -154,25 +154,25 @@ def test_hold_height_sinking_against_the_demand_raises_the_nose_slowly_up_to_a_l
     """An estimate that reads too nose-high: the climb missing is integrated into the pitch, not the throttle."""
     s, p, row = state(), record(), row_of(v_e_m_s=(12.6, 0.0, 1.0))  # at 50 m, and sinking at 1 m/s
     row["gps_p_e_m"] = (0.0, 0.0, -51.3)  # 1.3 s ago
-    first_pitch, first_throttle = hold_height(50.0, row, s, p, 0.02)
+    first_pitch, first_throttle = hold_height(50.0, 1.0, row, s, p, 0.02)
     for _ in range(49):
-        pitch, throttle = hold_height(50.0, row, s, p, 0.02)
+        pitch, throttle = hold_height(50.0, 1.0, row, s, p, 0.02)
     np.testing.assert_allclose(pitch - first_pitch, 0.98 * PARAMS.pitch_per_climb_rad_m, rtol=0, atol=1e-12)
     assert throttle == first_throttle
     for _ in range(5000):
-        hold_height(50.0, row, s, p, 0.02)
+        hold_height(50.0, 1.0, row, s, p, 0.02)
     assert s["climb_integral_rad"] == PARAMS.pitch_integral_limit_rad
 
 
 def test_hold_height_without_gps_is_level_flight_at_cruise():
     """No fix, no climb: trim pitch and trim throttle."""
-    demand = hold_height(100.0, row_of(valid=0), state(), record(), 0.02)
+    demand = hold_height(100.0, 1.0, row_of(valid=0), state(), record(), 0.02)
     np.testing.assert_allclose(demand, (PARAMS.pitch_trim_rad, PARAMS.throttle_trim), rtol=0, atol=1e-12)
 
 
 def test_throttle_for_pitch_grows_and_stays_within_limits():
     """More pitch, more throttle; never off, never above full."""
-    throttles = [throttle_for(math.radians(d), record()) for d in (-40.0, 0.0, 5.0, 60.0)]
+    throttles = [throttle_for(math.radians(d), 1.0, record()) for d in (-40.0, 0.0, 5.0, 60.0)]
     assert throttles[0] == PARAMS.throttle_least
     assert throttles[-1] == 1.0
     assert throttles[0] < throttles[1] < throttles[2] < throttles[3]

@@ -80,7 +80,7 @@ def test_climb_away_follows_the_throw_from_no_power_to_the_height():
     assert at(0.3, 1.7) == (PARAMS.climb_pitch_rad, 1.0)
     assert at(PARAMS.full_throttle_s, 20.0) == (
         PARAMS.climb_pitch_rad,
-        throttle_for(PARAMS.climb_pitch_rad, g),
+        throttle_for(PARAMS.climb_pitch_rad, 1.0, g),
     )
     near_pitch, near_throttle = at(12.0, 49.0)
     assert near_pitch < PARAMS.climb_pitch_rad
