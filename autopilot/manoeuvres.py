@@ -162,17 +162,24 @@ def vertical_climb(
     after: Setpoint,
     *,
     pitch_rate_rad_s: float = math.radians(100.0),
-    run_in: RunIn = DIVE,
+    pull_to_rad: float = QUARTER,
+    run_in: RunIn = LEVEL,
 ) -> Manoeuvre:
-    """Pulled to the vertical, then no rates at all for `climb_s`; whatever flies `after` brings the nose down.
+    """Pulled to the vertical, then no rates at all for `climb_s`, then pushed over until the nose is level.
+
+    Parameters
+    ----------
+    climb_s             vertical; pushed over while there is speed left
+    pull_to_rad         pitch to pull to: a little beyond the vertical, where the nose falls back as the speed goes
+    others              see `inside_loops`
 
     Returns
     -------
-    Manoeuvre           ends ``run-in + (pi / 2 - pitch of the run-in) / pitch rate + climb_s`` after it begins
+    Manoeuvre           ends ``run-in + (2 pull_to - pitch of the run-in) / pitch rate + climb_s`` after it begins
     """
-    _require_positive("vertical_climb", climb_s=climb_s, pitch_rate_rad_s=pitch_rate_rad_s)
-    pull = _rotated(run_in, ("pitch", QUARTER - run_in.pitch_rad, pitch_rate_rad_s))
-    return _in_turn(begin_s, after, *pull, _Step(climb_s, Setpoint(Mode.RATE, throttle=run_in.throttle)))
+    climb = _straight_up("vertical_climb", climb_s, pitch_rate_rad_s, pull_to_rad, run_in)
+    over = _rotation("pitch", -pull_to_rad, pitch_rate_rad_s, run_in.throttle)
+    return _in_turn(begin_s, after, *climb, over)
 
 
 def stall_turn(
@@ -180,36 +187,35 @@ def stall_turn(
     climb_s: float,
     after: Setpoint,
     *,
-    right: bool = True,
+    right: bool = False,
     pitch_rate_rad_s: float = math.radians(100.0),
-    yaw_rate_rad_s: float = math.radians(90.0),
+    pull_to_rad: float = QUARTER,
+    over_s: float = 1.6,
     dive_s: float = 0.5,
-    run_in: RunIn = DIVE,
+    run_in: RunIn = LEVEL,
 ) -> Manoeuvre:
-    """Vertical climb, yaw over by half a turn as the speed is gone, dive, pull out: level, heading reversed.
+    """Vertical climb, full rudder until the nose points down, dive, pull out: level, heading reversed.
 
     Parameters
     ----------
-    climb_s             vertical, until there is hardly any speed: the rudder lives on the slipstream then
-    right               which way it yaws
-    yaw_rate_rad_s      size of the rate
+    climb_s             vertical, without rates, until the rudder can turn the nose over: it lives on the slipstream
+    right               which way; the torque of a motor that turns to the right helps to the left
+    over_s              full rudder, full throttle; how fast that turns it is the aeroplane's business
     dive_s              straight down before the pull, motor off
-    others              see `inside_loops`
+    others              see `inside_loops` and `vertical_climb`
 
     Returns
     -------
-    Manoeuvre           ends ``run-in + (pi - pitch of the run-in) / pitch rate + climb_s + pi / yaw rate + dive_s``
+    Manoeuvre           ends ``run-in + (2 pull_to - pitch of the run-in) / pitch rate + climb_s + over_s + dive_s``
                         after it begins
     """
-    _require_positive(
-        "stall_turn", climb_s=climb_s, pitch_rate_rad_s=pitch_rate_rad_s, yaw_rate_rad_s=yaw_rate_rad_s, dive_s=dive_s
-    )
-    climb = vertical_climb(begin_s, climb_s, after, pitch_rate_rad_s=pitch_rate_rad_s, run_in=run_in)
-    over = _rotation("yaw", HALF if right else -HALF, yaw_rate_rad_s, run_in.throttle)
-    dive = _Step(dive_s, Setpoint(Mode.RATE, throttle=0.0))
-    pull = _rotation("pitch", QUARTER, pitch_rate_rad_s, throttle=0.0)
-    down = _in_turn(climb.ends_s, after, over, dive, pull)
-    return Manoeuvre(climb.timed[:-1] + down.timed, down.ends_s)
+    _require_positive("stall_turn", over_s=over_s, dive_s=dive_s)
+    climb = _straight_up("stall_turn", climb_s, pitch_rate_rad_s, pull_to_rad, run_in)
+    over = Setpoint(Mode.MANUAL, rudder=1.0 if right else -1.0, throttle=run_in.throttle)
+    dive = Setpoint(Mode.RATE, throttle=0.0)
+    # Yawed round by half a turn, a nose that was beyond the vertical is beyond it by as much coming down.
+    pull = _rotation("pitch", pull_to_rad, pitch_rate_rad_s, throttle=0.0)
+    return _in_turn(begin_s, after, *climb, _Step(over_s, over), _Step(dive_s, dive), pull)
 
 
 def spin(
@@ -217,7 +223,7 @@ def spin(
     hold_s: float,
     after: Setpoint,
     *,
-    right: bool = True,
+    right: bool = False,
     throttle: float = 0.6,
     recovery_s: float = 0.4,
     run_in: RunIn = STALLING,
@@ -230,7 +236,7 @@ def spin(
     Parameters
     ----------
     hold_s              sticks in the corner; how many turns that makes is the aeroplane's business
-    right               which way the rudder is put
+    right               which way the rudder is put; the torque of a motor that turns to the right helps to the left
     throttle            in the spin: some of it, where the elevator cannot hold the stall without slipstream
     recovery_s          until the rotation has stopped: held longer, the opposite rudder begins something new
     run_in              motor off and nose up until the wing stalls
@@ -276,6 +282,15 @@ def inverted_circuit(
         _Step(leg_s, replace(course, inverted=True, course_rad=course.course_rad + i * turn_rad)) for i in range(legs)
     )
     return _in_turn(begin_s, after, *steps)
+
+
+def _straight_up(
+    figure: str, climb_s: float, pitch_rate_rad_s: float, pull_to_rad: float, run_in: RunIn
+) -> list[_Step]:
+    """The run-in, the pull, and the climb without rates."""
+    _require_positive(figure, climb_s=climb_s, pitch_rate_rad_s=pitch_rate_rad_s, pull_to_rad=pull_to_rad)
+    pull = _rotated(run_in, ("pitch", pull_to_rad - run_in.pitch_rad, pitch_rate_rad_s))
+    return [*pull, _Step(climb_s, Setpoint(Mode.RATE, throttle=run_in.throttle))]
 
 
 def _rotated(run_in: RunIn, *rotations: tuple[Axis, float, float]) -> list[_Step]:

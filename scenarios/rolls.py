@@ -18,7 +18,7 @@ Passes when    it survives and is never below 50 m (from 120 m); the figures wer
 import math
 
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import RunIn, aileron_roll, immelmann, split_s
+from autopilot.manoeuvres import aileron_roll, immelmann, split_s
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
@@ -29,7 +29,6 @@ from scenarios.harness.scenario import Scenario
 ROLLS = 3
 FIRST_S = 25.0
 FIRST, OVER = at(FIRST_S), last(inverted)
-STEEP_DIVE = RunIn(3.0, math.radians(-15.0), 1.0)
 
 
 def _rolls(config: FlightConfig) -> Script:
@@ -48,7 +47,7 @@ def _figures(config: FlightConfig) -> Script:
     out = Setpoint(Mode.COURSE, course_rad=course_rad, height_m=m["height_m"])
     back = Setpoint(Mode.COURSE, course_rad=course_rad + math.pi, height_m=m["height_m"] + 15.0)
     rate_rad_s = math.radians(m["roll_rate_deg_s"])
-    up = immelmann(FIRST_S, back, roll_rate_rad_s=rate_rad_s, run_in=STEEP_DIVE)
+    up = immelmann(FIRST_S, back, roll_rate_rad_s=rate_rad_s)
     down = split_s(FIRST_S + 1.5 * m["every_s"], out, roll_rate_rad_s=rate_rad_s)
     return Script([Timed(0.0, out), *up.timed, *down.timed])
 

@@ -24,7 +24,18 @@ from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
 from scenarios.harness.manoeuvres import last, spinning, spun_turns
-from scenarios.harness.metrics import after, at, end, height_m, inclination_error_deg, lowest, over, rms, settling
+from scenarios.harness.metrics import (
+    after,
+    at,
+    end,
+    heading_error_deg,
+    height_m,
+    inclination_error_deg,
+    lowest,
+    over,
+    rms,
+    settling,
+)
 from scenarios.harness.scenario import Scenario
 
 FIRST_S = 25.0
@@ -34,7 +45,7 @@ FIRST, OVER = at(FIRST_S), last(spinning)
 def _script(config: FlightConfig) -> Script:
     m = config.manoeuvre
     level = Setpoint(Mode.COURSE, course_rad=math.radians(config.heading_deg), height_m=m["height_m"])
-    spun = spin(FIRST_S, m["hold_s"], level, throttle=m["throttle"], right=m["rudder"] > 0.0)
+    spun = spin(FIRST_S, m["hold_s"], level, throttle=m["throttle"])
     return Script([Timed(0.0, level), *spun.timed])
 
 
@@ -45,7 +56,7 @@ SCENARIO = Scenario(
         duration_s=80.0,
         start=InFlightStart(height_m=250.0),
         air=AirConfig(wind_m_s=3.0, wind_from_deg="random", turbulence_w20_m_s=3.0),
-        manoeuvre={"height_m": 250.0, "hold_s": 7.0, "throttle": 0.6, "rudder": 1.0},
+        manoeuvre={"height_m": 250.0, "hold_s": 7.0, "throttle": 0.6},
     ),
     script=_script,
     # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
@@ -57,6 +68,12 @@ SCENARIO = Scenario(
             "inclination within 15 deg for good",
             "s",
             settling(inclination_error_deg, 15.0, OVER, end),
+            15.0,
+        ),
+        Check(
+            "heading within 15 deg for good",
+            "s",
+            settling(heading_error_deg(), 15.0, OVER, end),
             15.0,
         ),
         Check(

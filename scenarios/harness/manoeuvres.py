@@ -183,3 +183,17 @@ def spun_turns(flight: Flight) -> Measured:
     truth = flight.log.truth
     rate = np.sum(truth["R_eb"][:, 2] * truth["imu_omega_b_rad_s"], axis=1)
     return Measured(float(abs(np.sum(rate[spinning(flight)]))) * flight.dt_s / (2.0 * np.pi))
+
+
+def course_turned(flags: Flags) -> Metric:
+    """Metric: how far the true course over the ground turned to the right between the first and last flag, turns."""
+
+    def metric(flight: Flight) -> Measured:
+        true = np.flatnonzero(flags(flight))
+        if not len(true):
+            return NOTHING
+        v_e = flight.log.truth["v_e_m_s"]
+        course = np.unwrap(np.arctan2(v_e[:, 1], v_e[:, 0]))
+        return Measured(float(course[true[-1]] - course[true[0]]) / (2.0 * np.pi))
+
+    return metric
