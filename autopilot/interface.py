@@ -9,7 +9,7 @@ from estimator.interface import AttitudeEstimate, Measurements
 
 
 class Mode(IntEnum):
-    """How the set-point is read.  The last three are asked for by nobody: failsafes, see `autopilot.failsafe`."""
+    """How the set-point is read.  The last four are asked for by nobody: failsafes, see `autopilot.failsafe`."""
 
     MANUAL = 0  # sticks move the surfaces
     RATE = 1  # sticks command body rates
@@ -22,6 +22,7 @@ class Mode(IntEnum):
     CIRCLE = 8  # no position: a gentle circle where one is, at cruise
     GLIDE = 9  # no position for long: the same circle, motor off, until somebody helps or the ground comes
     LEVEL = 10  # no attitude to believe: wings level on the gyros alone
+    LOW = 11  # too near the ground: climbs, and hardly banks on its way
 
 
 class Waypoint(NamedTuple):

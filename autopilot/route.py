@@ -1,0 +1,209 @@
+"""Round a point, and along a route: one guidance law for circles and lines alike.
+
+A reference point moves ahead on the path wanted, at the distance ``L1``.  With ``eta`` the angle from the direction
+flown to that point, the acceleration to the side is
+
+    a = 2 V^2 / L1 sin(eta)                                                    (Park, Deyst & How, Eqn 1)
+
+which is the centripetal acceleration of the circular arc that leads there, tangent to the direction flown.  On a
+circle of radius r already flown, sin(eta) = L1 / (2 r) and a = V^2 / r exactly; on a line a small error dies out with
+the natural frequency sqrt(2) V / L1 and a damping of 0.71.  ``L1`` is so many seconds of flight, and the bank is
+tan(bank) = a / g; V is the speed over the ground: that makes both laws hold in wind.
+
+Where the path is further away than ``L1`` the reference point is so as well, and the law keeps its gain: a circle is
+met along its tangent, a line at 45 degrees.
+
+A leg is left for the next one early enough for an arc between the two: r tan(angle / 2) before the corner, r the
+radius of the turn at the speed over the ground and the bank allowed, and the way flown while rolling into it.
+
+Source: S. Park, J. Deyst, J. P. How, A New Nonlinear Guidance Logic for Trajectory Tracking, AIAA 2004-4900.
+"""
+
+import math
+from dataclasses import dataclass
+
+from autopilot.guidance import gps_age, heading_error, unit
+from autopilot.stabilise import G_M_S2, shorter_way
+from estimator.jit import kernel
+from estimator.kernels import clip
+
+
+@dataclass(frozen=True, slots=True)
+class RouteParams:
+    """How circles and legs are followed.
+
+    lookahead_s : L1 in seconds of flight; larger is gentler, smaller weaves once the bank and the GPS lag behind it
+    radius_share : L1 is at most so much of the radius of a circle; beyond 2 it no longer meets a circle being flown
+    slowest_m_s : least speed over the ground that is reckoned with, lest nothing steers against a strong wind
+    roll_s : time that rolling into a turn takes, as if it were then flown at once
+    bank_share : of the bank limit, with which the turns from leg to leg are planned: the rest corrects
+    sharpest_rad : turns sharper than this are begun as if they were no sharper: the corner is then overshot
+    """
+
+    lookahead_s: float = 3.0
+    radius_share: float = 1.4
+    slowest_m_s: float = 5.0
+    roll_s: float = 0.5
+    bank_share: float = 0.9
+    sharpest_rad: float = math.radians(120.0)
+
+
+@kernel
+def position(row, s, g):  # type: ignore[no-untyped-def]
+    """Where the aeroplane is now, (north, east) from the launch point, m, and its speed over the ground, m/s.
+
+    The receiver's filter has a time constant T on position and velocity alike, so that ``p + T v`` is the unfiltered
+    position of its time stamp, in turns too.  From there on it moved with the velocity of now: the reported one,
+    turned by what it has not seen yet, and as much longer as the filter shortens a vector that turns at w,
+    sqrt(1 + (w T)^2).  NaN where there is no fix to believe.
+
+    row : measured   s : record with `unseen_turn_rad`   g : record of GuidanceParams
+    """
+    lag_s = gps_age(row, g)
+    if not math.isfinite(lag_s):
+        return math.nan, math.nan, math.nan
+    turned = s.unseen_turn_rad
+    longer = math.hypot(1.0, turned * g.gps_filter_s / max(lag_s, 1e-3))
+    cosine, sine = longer * math.cos(turned), longer * math.sin(turned)
+    north_m_s, east_m_s = row.gps_v_e_m_s[0], row.gps_v_e_m_s[1]
+    now_north_m_s, now_east_m_s = north_m_s * cosine - east_m_s * sine, north_m_s * sine + east_m_s * cosine
+    age_s = lag_s - g.gps_filter_s
+    north_m = row.gps_p_e_m[0] + g.gps_filter_s * north_m_s + age_s * now_north_m_s
+    east_m = row.gps_p_e_m[1] + g.gps_filter_s * east_m_s + age_s * now_east_m_s
+    return north_m, east_m, math.hypot(now_north_m_s, now_east_m_s)
+
+
+@kernel
+def bank_to_reach(north, east, aim_north, aim_east, speed_m_s, ahead_m, r_zy, limit_rad):  # type: ignore[no-untyped-def]
+    """Bank demand, rad, positive right, that leads from the direction flown to the reference point (Eqn 1).
+
+    More than 90 degrees away it is as at 90: the shorter way round, or that to which the wings already lean.
+
+    north, east : direction flown   aim_north, aim_east : direction of the point, (0, 0) is straight on
+    """
+    sine, cosine = heading_error(north, east, aim_north, aim_east)
+    side = shorter_way(sine, cosine, 0.5 * r_zy)
+    return clip(math.atan(2.0 * speed_m_s * speed_m_s / (ahead_m * G_M_S2) * side), -limit_rad, limit_rad)
+
+
+@kernel
+def aim_at_circle(centre_north_m, centre_east_m, radius_m, left, ahead_m):  # type: ignore[no-untyped-def]
+    """Direction (north, east) of the point of a circle that is `ahead_m` away and further round.
+
+    Outside, where the circle is not as near, the point where the tangent touches; inside, the nearest.  At the
+    centre all are as near: (0, 0), straight on.
+
+    centre_north_m, centre_east_m : of the centre, from here      left : flown turning left
+    """
+    distance_m = math.hypot(centre_north_m, centre_east_m)
+    if distance_m < 1e-3:
+        return 0.0, 0.0
+    tangent_m = math.sqrt(max(distance_m * distance_m - radius_m * radius_m, 0.0))
+    ahead_m = min(max(ahead_m, tangent_m, radius_m - distance_m), radius_m + distance_m)
+    # The triangle of here, centre and point has three known sides: its angle at here.
+    cosine = (ahead_m * ahead_m + distance_m * distance_m - radius_m * radius_m) / (2.0 * ahead_m * distance_m)
+    cosine = clip(cosine, -1.0, 1.0)
+    sine = math.sqrt(1.0 - cosine * cosine)
+    if not left:  # turning right, the centre is to the right of the point
+        sine = -sine
+    north, east = centre_north_m / distance_m, centre_east_m / distance_m
+    return north * cosine - east * sine, north * sine + east * cosine
+
+
+@kernel
+def aim_at_line(along_north, along_east, right_of_it_m, ahead_m):  # type: ignore[no-untyped-def]
+    """Direction (north, east) of the point of a line that is `ahead_m` away, or where 45 degrees meet it.
+
+    along_north, along_east : direction of the line   right_of_it_m : distance from it, positive to the right of it
+    """
+    ahead_m = max(ahead_m, math.sqrt(2.0) * abs(right_of_it_m))
+    sine = -right_of_it_m / ahead_m
+    cosine = math.sqrt(1.0 - sine * sine)
+    return along_north * cosine - along_east * sine, along_north * sine + along_east * cosine
+
+
+@kernel
+def bank_to_circle(north, east, r_zy, row, s, limit_rad, centre_north_m, centre_east_m, radius_m, left, p, g):  # type: ignore[no-untyped-def]
+    """Bank demand, rad, that leads to a circle and then round it; without a position one circles where one is.
+
+    north, east : direction of travel   centre_north_m, centre_east_m : from the launch point
+    p, g : records of RouteParams, GuidanceParams
+    """
+    north_m, east_m, speed_m_s = position(row, s, g)
+    if not math.isfinite(speed_m_s):
+        return clip(g.circling_bank_rad, -limit_rad, limit_rad)
+    speed_m_s = max(speed_m_s, p.slowest_m_s)
+    ahead_m = min(p.lookahead_s * speed_m_s, p.radius_share * radius_m)
+    aim_north, aim_east = aim_at_circle(centre_north_m - north_m, centre_east_m - east_m, radius_m, left, ahead_m)
+    return bank_to_reach(north, east, aim_north, aim_east, speed_m_s, ahead_m, r_zy, limit_rad)
+
+
+@kernel
+def begin_of_turn(speed_m_s, sine, cosine, limit_rad, p):  # type: ignore[no-untyped-def]
+    """Distance before a corner at which the turn to the next leg begins, m: roll, and r tan(angle / 2).
+
+    sine, cosine : of the angle between the legs   limit_rad : bank allowed
+    """
+    radius_m = speed_m_s * speed_m_s / (G_M_S2 * math.tan(max(p.bank_share * limit_rad, 0.05)))
+    half = 0.5 * min(math.atan2(abs(sine), cosine), p.sharpest_rad)
+    return p.roll_s * speed_m_s + radius_m * math.tan(half)
+
+
+@kernel
+def leg_flown(north_m, east_m, height_m, asked, s):  # type: ignore[no-untyped-def]
+    """Leg to the next waypoint: direction (north, east), length, way left, distance to its right, m.
+
+    It comes from the waypoint before, or, where none has been reached since the mode began, from where that was.
+
+    s : record with `next_waypoint`, `leg_from_m`, `on_leg`, updated
+    """
+    if not s.on_leg:
+        s.on_leg = 1
+        s.leg_from_m[0], s.leg_from_m[1], s.leg_from_m[2] = north_m, east_m, height_m
+    to = asked.route[s.next_waypoint]
+    leg_north_m, leg_east_m = to[0] - s.leg_from_m[0], to[1] - s.leg_from_m[1]
+    left_north_m, left_east_m = to[0] - north_m, to[1] - east_m
+    along_north, along_east = unit(leg_north_m, leg_east_m)
+    if along_north == 0.0 and along_east == 0.0:  # a leg of no length: straight to the waypoint
+        along_north, along_east = unit(left_north_m, left_east_m)
+    left_m = left_north_m * along_north + left_east_m * along_east
+    right_of_it_m = left_north_m * along_east - left_east_m * along_north
+    return along_north, along_east, math.hypot(leg_north_m, leg_east_m), left_m, right_of_it_m
+
+
+@kernel
+def height_on_leg(length_m, left_m, asked, s):  # type: ignore[no-untyped-def]
+    """Height on the straight way from the leg's beginning to its waypoint, m; that of the waypoint on a short leg."""
+    to_m = asked.route[s.next_waypoint][2]
+    if not (length_m > 1.0 and math.isfinite(s.leg_from_m[2])):
+        return to_m
+    return to_m + (s.leg_from_m[2] - to_m) * clip(left_m / length_m, 0.0, 1.0)
+
+
+@kernel
+def bank_along_route(north, east, r_zy, row, height_m, asked, s, limit_rad, p, g):  # type: ignore[no-untyped-def]
+    """Bank demand, rad, and height wanted, m, on the way along the route; one waypoint alone is circled.
+
+    north, east : direction of travel   height_m : of now   asked : record of the set-point
+    s : record with the progress along the route, updated   p, g : records of RouteParams, GuidanceParams
+    """
+    if asked.n_waypoints == 1:
+        only = asked.route[0]
+        bank = bank_to_circle(north, east, r_zy, row, s, limit_rad, only[0], only[1], asked.radius_m, asked.left, p, g)
+        return bank, only[2]
+    north_m, east_m, speed_m_s = position(row, s, g)
+    if not math.isfinite(speed_m_s):
+        return clip(g.circling_bank_rad, -limit_rad, limit_rad), asked.route[s.next_waypoint][2]
+    speed_m_s = max(speed_m_s, p.slowest_m_s)
+    along_north, along_east, length_m, left_m, right_of_it_m = leg_flown(north_m, east_m, height_m, asked, s)
+    to, then = asked.route[s.next_waypoint], asked.route[(s.next_waypoint + 1) % asked.n_waypoints]
+    then_north, then_east = unit(then[0] - to[0], then[1] - to[1])
+    sine, cosine = heading_error(along_north, along_east, then_north, then_east)
+    if left_m < begin_of_turn(speed_m_s, sine, cosine, limit_rad, p):
+        s.leg_from_m[0], s.leg_from_m[1], s.leg_from_m[2] = to[0], to[1], to[2]
+        s.next_waypoint = (s.next_waypoint + 1) % asked.n_waypoints
+        along_north, along_east, length_m, left_m, right_of_it_m = leg_flown(north_m, east_m, height_m, asked, s)
+    ahead_m = p.lookahead_s * speed_m_s
+    aim_north, aim_east = aim_at_line(along_north, along_east, right_of_it_m, ahead_m)
+    bank = bank_to_reach(north, east, aim_north, aim_east, speed_m_s, ahead_m, r_zy, limit_rad)
+    return bank, height_on_leg(length_m, left_m, asked, s)
