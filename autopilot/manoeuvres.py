@@ -132,8 +132,8 @@ def immelmann(
     Manoeuvre           ends ``run-in + (pi - pitch of the run-in) / pitch rate + pi / roll rate`` after it begins
     """
     _require_positive("immelmann", pitch_rate_rad_s=pitch_rate_rad_s, roll_rate_rad_s=roll_rate_rad_s)
-    up = ("pitch", HALF - run_in.pitch_rad, pitch_rate_rad_s)
-    return _in_turn(begin_s, after, *_rotated(run_in, up, ("roll", HALF, roll_rate_rad_s)))
+    up = _rotated(run_in, ("pitch", HALF - run_in.pitch_rad, pitch_rate_rad_s))
+    return _in_turn(begin_s, after, *up, _rotation("roll", HALF, roll_rate_rad_s, run_in.throttle))
 
 
 def split_s(

@@ -8,7 +8,9 @@ Verifies       Premerlani & Bizard, "Using DCM in control and navigation", 3 and
 Aircraft       endurance
 Wind           3 m/s from any direction, turbulence W20 = 3 m/s
 Sensors        generic
-Passes when    it survives and is never below 60 m (from 120 m); it was truly upside down for 45 s; LIMIT
+Passes when    it survives and is never below 80 m (from 120 m); it was truly upside down for 50 s and its course turned
+               by three right angles meanwhile, less 36 degrees at most; upside down inclination error at most 6 degrees
+               RMS, heading error at most 8; inclination error at most 5 degrees RMS from 10 to 30 s afterwards
 =============  ===================================================================================================
 """
 
@@ -62,30 +64,30 @@ SCENARIO = Scenario(
     # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
-        Check("upside down", "s", total_s(inverted), 45.0, ">="),
-        Check("course turned upside down", "turns", course_turned(inverted), 0.7, ">="),
-        Check("lowest height", "m", over(height_m, lowest, FIRST, end), 60.0, ">="),
+        Check("upside down", "s", total_s(inverted), 50.0, ">="),  # 58.9, 8.9 left
+        Check("course turned upside down", "turns", course_turned(inverted), 0.65, ">="),  # 0.69, 0.04 left
+        Check("lowest height", "m", over(height_m, lowest, FIRST, end), 80.0, ">="),  # 108.2, 28.2 left
         Check(
             "inclination error RMS upside down",
             "deg",
             over(inclination_error_deg, rms, FIRST, OVER),
-            8.0,
+            6.0,  # 3.5, 2.5 left
             pooled="rms",
-            per_flight_limit=12.0,
+            per_flight_limit=9.0,
         ),
         Check(
             "heading error RMS upside down",
             "deg",
             over(heading_error_deg(), rms, FIRST, OVER, judged_share=0.9),
-            15.0,
+            8.0,  # 3.8, 4.2 left
             pooled="rms",
-            per_flight_limit=22.0,
+            per_flight_limit=12.0,
         ),
         Check(
             "inclination error RMS afterwards",
             "deg",
             over(inclination_error_deg, rms, after(OVER, 10.0), after(OVER, 30.0)),
-            5.0,
+            5.0,  # 1.8, 3.2 left
             pooled="rms",
             per_flight_limit=7.5,
         ),

@@ -23,7 +23,7 @@ from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
 from scenarios.harness.manoeuvres import inverted, last, loops_end_s, most_loops, most_outside_loops, turns_that_count
-from scenarios.harness.metrics import after, inclination_error_deg, over, rms
+from scenarios.harness.metrics import after, end, height_m, inclination_error_deg, lowest, over, rms, start
 from scenarios.harness.scenario import Scenario
 
 LOOPS = 3
@@ -86,12 +86,13 @@ SCENARIOS = (
         script=_outside,
         checks=(
             SURVIVED,
-            Check("outside loops flown", "turns", most_outside_loops, turns_that_count(OUTSIDE), ">="),
+            Check("outside loops flown", "turns", most_outside_loops, turns_that_count(OUTSIDE), ">="),  # 2.07, 0.13 left
+            Check("lowest height", "m", over(height_m, lowest, start, end), 60.0, ">="),  # 73.0, 13.0 left
             Check(
                 "inclination error RMS",
                 "deg",
                 over(inclination_error_deg, rms, after(PUSHED, 10.0), after(PUSHED, 30.0)),
-                5.0,
+                5.0,  # 2.1, 2.9 left
                 pooled="rms",
                 per_flight_limit=7.5,
             ),

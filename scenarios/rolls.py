@@ -5,13 +5,13 @@ Story          Straight and level until everything has settled; then every ten s
                put over for a whole roll, three times right, three times left.
                Variant: Immelmann and split S: up by half a loop and half a roll, back down by half a roll and half a
                loop, each of which ends with the heading reversed.
-Verifies       Premerlani & Bizard: rotations are integrated as a matrix, so that no attitude is special (Eqn 17, 18-21);
-               what roll gyros of 1.5 % of gain error leave behind, the feedback removes (Eqns 25-29)
+Verifies       Premerlani & Bizard: rotations are integrated as a matrix, so that no attitude is special (Eqn 17,
+               18-21); what the gain error of the gyros leaves behind, the feedback removes (Eqns 25-29)
 Aircraft       endurance
 Wind           3 m/s from any direction, turbulence W20 = 3 m/s
 Sensors        generic
-Passes when    it survives and is never below 50 m (from 120 m); the figures were truly flown; inclination error at most
-               LIMIT degrees RMS while they are, and at most 5 degrees RMS from 10 to 30 s after the last one
+Passes when    it survives and is never below 80 m (from 120 m); the figures were truly flown; inclination error at most
+               10 degrees RMS from the first to the last of them, and at most 5 degrees RMS from 10 to 30 s after it
 =============  ===================================================================================================
 """
 
@@ -27,6 +27,7 @@ from scenarios.harness.metrics import after, at, end, height_m, inclination_erro
 from scenarios.harness.scenario import Scenario
 
 ROLLS = 3
+SHORT = 0.1  # turns that the rolls together may end short, 12 degrees each
 FIRST_S = 25.0
 FIRST, OVER = at(FIRST_S), last(inverted)
 
@@ -65,22 +66,22 @@ SCENARIO = Scenario(
     # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
-        Check("rolled to the right", "turns", turned("x", 1.0), turns_that_count(ROLLS), ">="),
-        Check("rolled to the left", "turns", turned("x", -1.0), turns_that_count(ROLLS), ">="),
-        Check("lowest height", "m", over(height_m, lowest, FIRST, end), 50.0, ">="),
+        Check("rolled to the right", "turns", turned("x", 1.0), ROLLS - SHORT, ">="),  # 2.97, 0.07 left
+        Check("rolled to the left", "turns", turned("x", -1.0), ROLLS - SHORT, ">="),  # 2.98, 0.08 left
+        Check("lowest height", "m", over(height_m, lowest, FIRST, end), 80.0, ">="),  # 115.6, 35.6 left
         Check(
             "inclination error RMS while rolling",
             "deg",
             over(inclination_error_deg, rms, FIRST, OVER),
-            8.0,
+            10.0,  # 6.3, 3.7 left
             pooled="rms",
-            per_flight_limit=12.0,
+            per_flight_limit=15.0,
         ),
         Check(
             "inclination error RMS afterwards",
             "deg",
             over(inclination_error_deg, rms, after(OVER, 10.0), after(OVER, 30.0)),
-            5.0,
+            5.0,  # 1.7, 3.3 left
             pooled="rms",
             per_flight_limit=7.5,
         ),
@@ -99,9 +100,9 @@ SCENARIOS = (
         script=_figures,
         checks=(
             SURVIVED,
-            Check("nose came round", "turns", most_loops, turns_that_count(1), ">="),
-            Check("rolled to the right", "turns", turned("x", 1.0), turns_that_count(1), ">="),
-            *SCENARIO.checks[3:],
+            Check("nose came round", "turns", most_loops, turns_that_count(1), ">="),  # F1
+            Check("rolled to the right", "turns", turned("x", 1.0), 1.0 - SHORT, ">="),  # F2
+            *SCENARIO.checks[3:],  # F3
         ),
     ),
 )

@@ -24,7 +24,6 @@ from scenarios.harness.metrics import (
 )
 from sim.log import Flight
 
-
 Flags = Callable[[Flight], NDArray[np.bool_]]  # of each tick, shape (n,)
 
 
