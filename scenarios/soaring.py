@@ -79,7 +79,21 @@ SCENARIO = Scenario(
         Check("lowest height", "m", over(height_m, lowest, start, end), 60.0, ">="),
         Check("height at the end", "m", height_at_m(DURATION_S), 150.0, ">="),
         Check("bank", "deg", over(bank_size_deg, highest, start, end), 45.0),
-        Check("inclination error RMS", "deg", over(inclination_error_deg, rms, SETTLED), 6.0, pooled="rms", per_flight_limit=9.0),
-        Check("heading error RMS", "deg", over(heading_error_deg(), rms, SETTLED, judged_share=0.9), 12.0, pooled="rms", per_flight_limit=18.0),
+        Check(
+            "inclination error RMS",
+            "deg",
+            over(inclination_error_deg, rms, SETTLED),
+            6.0,
+            pooled="rms",
+            per_flight_limit=9.0,
+        ),
+        Check(
+            "heading error RMS",
+            "deg",
+            over(heading_error_deg(), rms, SETTLED, judged_share=0.9),
+            12.0,
+            pooled="rms",
+            per_flight_limit=18.0,
+        ),
     ),
 )

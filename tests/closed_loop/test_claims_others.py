@@ -56,7 +56,7 @@ def test_note_at_rest_removes_a_tilt_as_its_equations_say():
     for _ in reports[1:]:
         mean = math.radians(0.5 * (expected[-1] + (expected[-2] if len(expected) > 1 else 10.0)))
         expected.append(expected[-1] - math.degrees(part * math.sin(mean)))
-    # The earth turns at 0.004 deg/s, 0.008 degrees at this gain; the mean of a tick is half a tick old, 1 % of the tilt.
+    # The earth turns at 0.004 deg/s, 0.008 degrees at this gain; the mean of a tick is half a tick old: 1 %.
     np.testing.assert_allclose(tilt[reports], expected, rtol=0, atol=0.05)
 
 
