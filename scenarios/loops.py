@@ -86,7 +86,9 @@ SCENARIOS = (
         script=_outside,
         checks=(
             SURVIVED,
-            Check("outside loops flown", "turns", most_outside_loops, turns_that_count(OUTSIDE), ">="),  # 2.07, 0.13 left
+            Check(
+                "outside loops flown", "turns", most_outside_loops, turns_that_count(OUTSIDE), ">="
+            ),  # 2.07, 0.13 left
             Check("lowest height", "m", over(height_m, lowest, start, end), 60.0, ">="),  # 73.0, 13.0 left
             Check(
                 "inclination error RMS",

@@ -66,7 +66,9 @@ SCENARIO = Scenario(
     checks=(
         SURVIVED,
         Check("spun", "turns", spun_turns, 4.0, ">="),  # 4.79, 0.79 left
-        Check("fastest roll", "deg/s", over(rate_size_deg_s("x"), highest, FIRST, OVER), 300.0, ">="),  # 314.0, 14.0 left
+        Check(
+            "fastest roll", "deg/s", over(rate_size_deg_s("x"), highest, FIRST, OVER), 300.0, ">="
+        ),  # 314.0, 14.0 left
         Check("lowest height", "m", over(height_m, lowest, FIRST, end), 100.0, ">="),  # 152.3, 52.3 left
         Check(
             "inclination within 15 deg for good",

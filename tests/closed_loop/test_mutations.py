@@ -1,10 +1,11 @@
 """What each scenario catches: estimators broken in one respect, each of which fails where that respect matters.
 
-Each row of the table is a scenario and what breaks it: a baseline, or the default estimator with one idea of the
-paper taken out; and the check that must notice.  The unbroken estimator passes the same seeds in `test_scenarios`.
-For `gps_latency`, whose point is a failure, it is the cure that must fail.
+Each row of the table is a scenario and what breaks it: a baseline, the default estimator with one idea of the
+paper taken out, or an autopilot with a fault of its own; and the check that must notice.  The unbroken ones pass
+the same seeds in `test_scenarios`.  For `gps_latency`, whose point is a failure, it is the cure that must fail.
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -21,6 +22,10 @@ WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
+BROKEN_AUTOPILOTS = Path(__file__).with_name("broken_autopilots.py")
+NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
+HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
+RUDDER_STUCK = {"autopilot": f"{BROKEN_AUTOPILOTS}:RudderStuck"}
 
 
 class Mutation(NamedTuple):
@@ -51,10 +56,23 @@ MUTATIONS = (
     Mutation("gyro_saturation", "gyro_only", {}, "survived"),
     Mutation("gyro_saturation", "premerlani", WEAK_FEEDBACK, "inclination within 15 deg for good"),
     Mutation("hand_launch", "accelerometer_only", {}, "survived"),
+    Mutation("inverted", "gyro_only", {}, "survived"),
+    Mutation("inverted", "premerlani", NO_YAW, "heading error RMS upside down"),
+    Mutation("inverted", "premerlani", NEVER_INVERTED, "upside down"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
+    Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
+    Mutation("rolls", "premerlani", WEAK_FEEDBACK, "inclination error RMS while rolling"),
+    Mutation("rolls", "premerlani", HALF_THE_RATE, "rolled to the left"),
+    Mutation("rolls_figures", "premerlani", WEAK_FEEDBACK, "inclination error RMS afterwards"),
+    Mutation("stall_spin", "premerlani", NO_YAW, "heading within 15 deg for good"),
+    Mutation("stall_spin", "premerlani", WEAK_FEEDBACK, "inclination error RMS afterwards"),
+    Mutation("stall_spin", "premerlani", RUDDER_STUCK, "spun"),
     Mutation("turns_180", "accelerometer_only", {}, "survived"),
     Mutation("turns_180", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
+    Mutation("vertical", "premerlani", NO_YAW, "heading error RMS afterwards"),
+    Mutation("vertical", "premerlani", TRUSTS_FORCE, "inclination error RMS while going up and over"),
+    Mutation("vertical", "premerlani", RUDDER_STUCK, "swung round to the left"),
 )
 
 
