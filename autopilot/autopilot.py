@@ -26,6 +26,7 @@ from autopilot.guidance import (
     heading_error,
     height,
     unseen_turn,
+    way_wanted,
 )
 from autopilot.interface import MOST_WAYPOINTS, ActuatorCommand, Mode, Setpoint
 from autopilot.launch import climb_away, feel_throw
@@ -120,13 +121,14 @@ def enter(mode, led_by, height_m, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def reckon_speed(R_eb, wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
+def reckon_speed(wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
     """On which side one flies, how fast one would, and how fast one does, into the state."""
     s, e = me.s, me.p.energy
     s.inverted = me.asked.inverted and s.mode in (STABILISE, COURSE) and math.isfinite(e.inverted_m_s)
     travels = s.led_by in (COURSE, RETURN, LOITER, WAYPOINTS)
     if travels:
-        believe_headwind(R_eb, wind_e_m_s, row, s, me.on_nose, me.p, dt_s)
+        towards_north, towards_east = way_wanted(me.asked, row, s, me.p.guidance)
+        believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, me.p, dt_s)
     want_airspeed(me.asked, travels, s, e)
     believe_airspeed(wind_e_m_s, row, s, me.p, dt_s)
 
@@ -229,7 +231,7 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     if mode != s.mode or led_by != s.led_by:
         enter(mode, led_by, height_m, s)
     s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
-    reckon_speed(R_eb, wind_e_m_s, row, me, dt_s)
+    reckon_speed(wind_e_m_s, row, me, dt_s)
     if mode == MANUAL:
         throttle = asked.throttle if math.isfinite(asked.throttle) else 0.0
         # The sticks are the surfaces: no trim, no mixing.

@@ -38,7 +38,7 @@ class EnergyParams:
     airspeed_m_s : cruise        stall_m_s, best_glide_m_s, fastest_m_s : other speeds of level flight
     inverted_m_s, inverted_stall_m_s : on its back; NaN where it cannot fly there, and stays upright
     speed_trust_s : a measured airspeed is believed for so long        speed_filter_s : time constant of the belief
-    headwind_filter_s : time constant of the headwind that is seen from the ground speed
+    headwind_found_s, headwind_lost_s : time constants of the headwind believed, growing and shrinking
     climb_per_height_1_s, climb_limit_m_s, sink_limit_m_s : climb demanded per height missing, and its limits
     gain_per_speed_1_s, gain_limit_m_s2 : acceleration demanded per airspeed missing, and its limit
     height_weight : 1 - w: 0 where the pitch is the speed's        climb_per_margin_1_s : climb allowed per airspeed
@@ -59,7 +59,8 @@ class EnergyParams:
     inverted_stall_m_s: float = 11.3
     speed_trust_s: float = 0.5
     speed_filter_s: float = 1.0
-    headwind_filter_s: float = 4.0
+    headwind_found_s: float = 1.0
+    headwind_lost_s: float = 30.0
     climb_per_height_1_s: float = 0.25
     climb_limit_m_s: float = 3.0
     sink_limit_m_s: float = 2.0
@@ -116,25 +117,30 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
 
 
 @kernel
-def believe_headwind(R_eb, wind_e_m_s, row, s, on_nose, p, dt_s):  # type: ignore[no-untyped-def]
-    """Speed over the ground now, and slowly the wind against the nose, never below 0, m/s, in `s`.
+def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
+    """Speed over the ground now, and the wind against the way wanted, never below 0, m/s, in `s`.
 
-    The headwind comes from wind and nose, where the estimator tells both; else it is what the ground speed lacks of
-    the airspeed.  NaN is the speed over the ground that nobody knows.
+    The headwind comes from the estimator's wind, where it tells one; else from what the ground speed has more or less
+    than the airspeed, the wind along the track: who is to turn round and is blown away is told by that before
+    he turns.  It is believed quickly and forgotten slowly, for across the wind nothing shows.
 
-    R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured   p : record of AutopilotParams
-    s : record with `ground_m_s`, `headwind_m_s`, updated
+    towards_north, towards_east : way wanted, of length 1; (0, 0) is the way flown   wind_e_m_s : shape (3,) or NaN
+    row : measured   p : record of AutopilotParams   s : record with `ground_m_s` (NaN: unknown) and `headwind_m_s`
     """
     now_m_s, lag_s = 0.0, gps_age(row, p.guidance)
     s.ground_m_s = math.nan
     if math.isfinite(lag_s):
+        north, east = unit(row.gps_v_e_m_s[0], row.gps_v_e_m_s[1])
         turned = s.unseen_turn_rad * p.guidance.gps_filter_s / max(lag_s, 1e-3)
         s.ground_m_s = math.hypot(row.gps_v_e_m_s[0], row.gps_v_e_m_s[1]) * math.hypot(1.0, turned)
-        now_m_s = max(s.airspeed_m_s - s.ground_m_s, 0.0)
-    if on_nose and math.isfinite(wind_e_m_s[0] + wind_e_m_s[1]):
-        north, east = unit(R_eb[0, 0], R_eb[1, 0])
-        now_m_s = max(-(north * wind_e_m_s[0] + east * wind_e_m_s[1]), 0.0)
-    s.headwind_m_s += dt_s / (p.energy.headwind_filter_s + dt_s) * (now_m_s - s.headwind_m_s)
+        if towards_north == 0.0 and towards_east == 0.0:
+            towards_north, towards_east = north, east
+        now_m_s = (s.airspeed_m_s - s.ground_m_s) * (towards_north * north + towards_east * east)
+        if math.isfinite(wind_e_m_s[0] + wind_e_m_s[1]):
+            now_m_s = -(towards_north * wind_e_m_s[0] + towards_east * wind_e_m_s[1])
+    now_m_s = max(now_m_s, 0.0)
+    filter_s = p.energy.headwind_found_s if now_m_s > s.headwind_m_s else p.energy.headwind_lost_s
+    s.headwind_m_s += dt_s / (filter_s + dt_s) * (now_m_s - s.headwind_m_s)
 
 
 @kernel

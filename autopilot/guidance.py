@@ -10,9 +10,12 @@ Source: Premerlani & Bizard, Direction Cosine Matrix IMU: Theory, "Using DCM in 
 import math
 from dataclasses import dataclass
 
+from autopilot.interface import Mode
 from autopilot.stabilise import shorter_way
 from estimator.jit import kernel
 from estimator.kernels import clip
+
+COURSE, RETURN = int(Mode.COURSE), int(Mode.RETURN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +128,30 @@ def bank_for_heading(sine, cosine, r_zy, limit_rad, p):  # type: ignore[no-untyp
 
 
 @kernel
+def way_home(row, p):  # type: ignore[no-untyped-def]
+    """(north, east) from here to the launch point, m: the last fix moved on by its age; NaN where there is none."""
+    age_s = gps_age(row, p)
+    if not math.isfinite(age_s):
+        return math.nan, math.nan
+    return -(row.gps_p_e_m[0] + age_s * row.gps_v_e_m_s[0]), -(row.gps_p_e_m[1] + age_s * row.gps_v_e_m_s[1])
+
+
+@kernel
+def way_wanted(asked, row, s, p):  # type: ignore[no-untyped-def]
+    """Direction (north, east) of the course or of the launch point, whichever leads; (0, 0) where neither does.
+
+    asked : record of the set-point   s : record with `led_by`, `outbound`
+    """
+    if s.led_by == COURSE:
+        return math.cos(asked.course_rad), math.sin(asked.course_rad)
+    if s.led_by == RETURN and not s.outbound:
+        north, east = way_home(row, p)
+        if math.isfinite(north):
+            return unit(north, east)
+    return 0.0, 0.0
+
+
+@kernel
 def bank_to_return(north, east, r_zy, row, s, limit_rad, p):  # type: ignore[no-untyped-def]
     """Bank demand, rad, that leads to the launch point, over it, away from it, and back again.
 
@@ -133,12 +160,10 @@ def bank_to_return(north, east, r_zy, row, s, limit_rad, p):  # type: ignore[no-
 
     north, east : direction of travel   row : measured   s : record with `outbound`, updated
     """
-    age_s = gps_age(row, p)
-    if not math.isfinite(age_s):
-        return clip(p.circling_bank_rad, -limit_rad, limit_rad)
-    home_north = -(row.gps_p_e_m[0] + age_s * row.gps_v_e_m_s[0])
-    home_east = -(row.gps_p_e_m[1] + age_s * row.gps_v_e_m_s[1])
+    home_north, home_east = way_home(row, p)
     distance_m = math.hypot(home_north, home_east)
+    if not math.isfinite(distance_m):
+        return clip(p.circling_bank_rad, -limit_rad, limit_rad)
     if distance_m < p.passed_m:
         s.outbound = 1
     elif distance_m > p.turn_back_m:

@@ -1,8 +1,8 @@
-"""What each scenario catches: estimators broken in one respect, each of which fails where that respect matters.
+"""What each scenario catches: flight code broken in one respect, which fails where that respect matters.
 
-Each row of the table is a scenario and what breaks it: a baseline, or the default estimator with one idea of the
-paper taken out; and the check that must notice.  The unbroken estimator passes the same seeds in `test_scenarios`.
-Where the point of a scenario is a failure, it is the cure that must fail.
+Each row of the table is a scenario and what breaks it: a baseline, the default estimator with one idea of the
+paper taken out, or an autopilot with a fault of its own; and the check that must notice.  The unbroken ones pass
+the same seeds in `test_scenarios`.  Where the point of a scenario is a failure, it is the cure that must fail.
 """
 
 from pathlib import Path
@@ -24,9 +24,12 @@ NO_YAW = {"estimator_params.w_y": 0}
 UNAWARE = {"suits.gps_latency_s": 0.3}
 UNTURNED = {"turn_table": False}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
-_BROKEN = Path(__file__).with_name("broken_autopilots.py")
-TURNS_AT_THE_CORNER = {"autopilot": f"{_BROKEN}:TurnsAtTheCorner"}
-NEVER_MISSES_THE_GPS = {"autopilot": f"{_BROKEN}:NeverMissesTheGps"}
+BROKEN_AUTOPILOTS = Path(__file__).with_name("broken_autopilots.py")
+TURNS_AT_THE_CORNER = {"autopilot": f"{BROKEN_AUTOPILOTS}:TurnsAtTheCorner"}
+NEVER_MISSES_THE_GPS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverMissesTheGps"}
+NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
+HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
+RUDDER_STUCK = {"autopilot": f"{BROKEN_AUTOPILOTS}:RudderStuck"}
 
 
 class Mutation(NamedTuple):
@@ -85,6 +88,9 @@ MUTATIONS = (
     Mutation("hand_launch_cross_wind", "premerlani", NO_YAW, "heading within 15 deg for good"),
     Mutation("hand_launch_gust", "accelerometer_only", {}, "survived"),
     Mutation("hand_launch_head_wind", "gyro_only", {}, "heading within 15 deg for good"),
+    Mutation("inverted", "gyro_only", {}, "survived"),
+    Mutation("inverted", "premerlani", NO_YAW, "heading error RMS upside down"),
+    Mutation("inverted", "premerlani", NEVER_INVERTED, "upside down"),
     Mutation("iron", "gps_velocity_magnetometer", UNTURNED, "heading error of the nose RMS"),
     Mutation("iron", "gyro_only", {}, "heading error of the nose RMS"),
     Mutation(
@@ -94,7 +100,16 @@ MUTATIONS = (
         "heading error of the nose, to be large",
     ),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
+    Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
+    Mutation("rolls", "premerlani", WEAK_FEEDBACK, "inclination error RMS while rolling"),
+    Mutation("rolls", "premerlani", HALF_THE_RATE, "rolled to the left"),
+    Mutation("rolls_figures", "premerlani", WEAK_FEEDBACK, "inclination error RMS afterwards"),
+    Mutation("soaring", "accelerometer_only", {}, "survived"),
+    Mutation("soaring", "premerlani", NO_YAW, "height at the end"),
+    Mutation("stall_spin", "premerlani", NO_YAW, "heading within 15 deg for good"),
+    Mutation("stall_spin", "premerlani", WEAK_FEEDBACK, "inclination error RMS afterwards"),
+    Mutation("stall_spin", "premerlani", RUDDER_STUCK, "spun"),
     Mutation("turbulence_mission", "premerlani", NO_YAW, "waypoints reached"),
     Mutation("turbulence_mission", "premerlani", TURNS_AT_THE_CORNER, "off the legs RMS"),
     Mutation("turns_180", "accelerometer_only", {}, "survived"),
@@ -103,6 +118,9 @@ MUTATIONS = (
     Mutation("turns_180_bank_45", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
     Mutation("turns_180_bank_60", "premerlani", TRUSTS_FORCE, "inclination error RMS while banked"),
     Mutation("turns_180_bank_60", "premerlani", {"manoeuvre.bank_deg": 45.0}, "banked by 54 deg or more"),
+    Mutation("vertical", "premerlani", NO_YAW, "heading error RMS afterwards"),
+    Mutation("vertical", "premerlani", TRUSTS_FORCE, "inclination error RMS while going up and over"),
+    Mutation("vertical", "premerlani", RUDDER_STUCK, "swung round to the left"),
 )
 
 
