@@ -39,7 +39,7 @@ def printed(**params: Any) -> PremerlaniParams:
 
 
 @lru_cache(maxsize=16)
-def _sensed(motion: Any, duration_s: float, suite: str, changes: tuple[tuple[str, Any], ...], seed: int) -> Log:
+def _sensed(motion: Motion, duration_s: float, suite: str, changes: tuple[tuple[str, Any], ...], seed: int) -> Log:
     params = suite_params(suite, dict(changes))
     rates = Rates(imu_hz=IMU_HZ, gps_hz=params.gps.rate_hz)
     log = Log.empty(rates.ticks(duration_s))
@@ -57,7 +57,8 @@ def sensed(
     motion: Motion, duration_s: float, suite: str = "ideal", changes: Mapping[str, Any] = LAGGED, seed: int = 0
 ) -> Log:
     """The truth of `motion` and what the sensors say of it, at 50 Hz; read-only, for it is shared."""
-    return _sensed(motion, duration_s, suite, tuple(sorted(changes.items())), seed)
+    told = tuple(sorted(changes.items()))
+    return _sensed(motion, duration_s, suite, told, seed)  # type: ignore[arg-type]  # motions are frozen
 
 
 def misread(log: Log, gain: Sequence[float] = (1.0, 1.0, 1.0), offset_rad_s: Array | float = 0.0) -> NDArray[Any]:
