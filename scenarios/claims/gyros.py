@@ -1,4 +1,4 @@
-"""Gyros: how fast they drift, what a wrong gain and the end of their range do, and whether dear ones are needed."""
+"""Gyros: how fast they drift, what a wrong gain does, whether dear ones are needed; and the offset of the other."""
 
 import math
 from collections.abc import Sequence
@@ -8,12 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from estimator.baselines import GyroOnly
-from estimator.interface import MEASURED_DTYPE, ImuSample
+from estimator.interface import ImuSample
 from estimator.premerlani import Premerlani
 from scenarios.claims._open_loop import (
     IMU_HZ,
     attitude_deg,
     begin,
+    inclination_deg,
     misread,
     printed,
     sensed,
@@ -22,9 +23,7 @@ from scenarios.harness.checks import Row
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claim_flights import flights
 from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
-from scenarios.harness.manoeuvres import loops_end_s
-from scenarios.harness.metrics import inclination_error_deg, rms, settled_after_s
-from sim.log import Flight
+from scenarios.harness.metrics import inclination_error_deg, rms
 from sim.power_up import mean_sample
 from sim.prescribed_plant import HandHeld, Motion, Rest, SteadyTurn, StraightLevel
 
@@ -177,107 +176,6 @@ def _gain(_seeds: Sequence[int]) -> Finding:
     )
 
 
-RANGE_DEG_S, PEAK_DEG_S, PULSE_S = 100.0, 160.0, 2.0
-
-
-def _area_not_seen(_seeds: Sequence[int]) -> Finding:
-    t_s = (np.arange(round(PULSE_S * IMU_HZ)) + 0.5) / IMU_HZ
-    peaks = np.linspace(60.0, 240.0, 19)  # beyond, half a turn is lost
-    rows = np.zeros((len(t_s),), MEASURED_DTYPE)
-    rows["t_s"], rows["dt_s"] = t_s + 0.5 / IMU_HZ, 1.0 / IMU_HZ
-    rows["force_b_m_s2"] = (0.0, 0.0, -9.8)
-
-    def error_deg(peak: float) -> float:
-        """Of the gyros alone after a pulse of pitch rate, a half sine that is clipped."""
-        rate = np.minimum(peak * np.sin(np.pi * t_s / PULSE_S), RANGE_DEG_S)
-        rows["gyro_b_rad_s"][:, 1] = np.radians(rate)
-        R_eb = begin(GyroOnly(), np.eye(3)).replay(rows)["R_eb"][-1]
-        true_rad = math.radians(2.0 * peak * PULSE_S / np.pi)
-        pitched_rad = math.atan2(-R_eb[2, 0], R_eb[0, 0])
-        return math.degrees(abs((true_rad - pitched_rad + np.pi) % (2.0 * np.pi) - np.pi))
-
-    def area_deg(peak: float) -> float:
-        """Between the half sine and the end of the range, in closed form."""
-        if peak <= RANGE_DEG_S:
-            return 0.0
-        clips = math.asin(RANGE_DEG_S / peak)  # phase at which it begins to clip
-        return PULSE_S / np.pi * (2.0 * peak * math.cos(clips) - RANGE_DEG_S * (np.pi - 2.0 * clips))
-
-    measured, areas = (np.array([f(peak) for peak in peaks]) for f in (error_deg, area_deg))
-    apart = float(np.abs(measured - areas).max())
-
-    def draw(figure: Figure) -> None:
-        pulse, angle = axes(figure, "A pitch rate beyond the range of the gyro", "The angle that is lost is the area")
-        fine = np.linspace(0.0, PULSE_S, 200)
-        true = PEAK_DEG_S * np.sin(np.pi * fine / PULSE_S)
-        pulse.plot(fine, true, color=BLUE, label="true rate")
-        pulse.plot(fine, np.minimum(true, RANGE_DEG_S), color=ORANGE, label="what the gyro says")
-        pulse.fill_between(fine, np.minimum(true, RANGE_DEG_S), true, color=RED, alpha=0.18, lw=0)
-        pulse.annotate(f"{area_deg(PEAK_DEG_S):.0f} deg", (0.84, 120.0), color=RED)
-        pulse.legend(loc="lower center")
-        label(pulse, "time, s", "pitch rate, deg/s")
-        angle.plot(peaks, areas, color=FAINT, ls="--", label="area between the two")
-        angle.plot(peaks, measured, "o", ms=4, color=BLUE, label="error of the matrix")
-        angle.legend()
-        label(angle, "peak of the rate, deg/s", "angle, deg")
-
-    return Finding(
-        stands=(line("angle lost against area, apart at most", "deg", apart, "<=", 1.0),),
-        told=f"A pulse of two seconds with a peak of {PEAK_DEG_S:.0f} deg/s on a gyro that ends at {RANGE_DEG_S:.0f} "
-        f"leaves {error_deg(PEAK_DEG_S):.1f} degrees; the area is {area_deg(PEAK_DEG_S):.1f}. From 60 to 240 deg/s the "
-        f"two are never more than {apart:.2f} degrees apart.",
-        seeds=0,
-        draw=draw,
-    )
-
-
-LOOPED = loops_end_s(3)
-ERASED_DEG, IN_ORDER_OF_S = 10.0, 15.0
-NO_GATE = {"estimator_params.launch_gate": math.inf}  # the paper has none
-
-
-def _after_the_loops(flight: Flight) -> Any:
-    """Inclination error from the end of the third loop on, for 40 s."""
-    looped_s = LOOPED(flight)
-    return inclination_error_deg(flight).within(looped_s, looped_s + 40.0)
-
-
-def _saturation_erased(seeds: Sequence[int]) -> Finding:
-    flown = {
-        "as printed": flights("gyro_saturation", seeds, NO_GATE),
-        "a fifth of the weight": flights("gyro_saturation", seeds, {**NO_GATE, "estimator_params.w_rp": 0.06}),
-    }
-    errors = {how: [_after_the_loops(flight) for flight in these] for how, these in flown.items()}
-    erased = {how: [settled_after_s(series, ERASED_DEG) for series in these] for how, these in errors.items()}
-    left = float(np.mean([series.value[: 2 * IMU_HZ].max() for series in errors["as printed"]]))
-    mean_s, slowest_s = float(np.mean(erased["as printed"])), float(np.max(erased["as printed"]))
-    slack = [t for t in erased["a fifth of the weight"] if math.isfinite(t)]
-
-    def draw(figure: Figure) -> None:
-        (ax,) = axes(figure, "Three loops beyond the range of the gyros, and what comes after")
-        for how, colour in (("a fifth of the weight", FAINT), ("as printed", BLUE)):
-            for i, series in enumerate(errors[how]):
-                since = series.t_s - series.t_s[0]
-                ax.plot(since, series.value, color=colour, lw=1.3, label=how if i == 0 else None)
-        ax.axhline(ERASED_DEG, color=RED, ls="--", lw=1, label="counts as erased")
-        ax.legend()
-        ax.set_ylim(0.0, None)
-        label(ax, "time after the third loop, s", "inclination error, deg")
-
-    return Finding(
-        stands=(
-            line("error left by the loops, mean", "deg", left, ">=", 2.0 * ERASED_DEG),
-            line("below 10 deg for good, mean", "s", mean_s, "<=", IN_ORDER_OF_S),
-            line("below 10 deg for good, slowest", "s", slowest_s, "<=", 2.0 * IN_ORDER_OF_S),
-        ),
-        told=f"Gyros that end at 100 deg/s in loops at 110 deg/s and more leave {left:.0f} degrees. With a weight of "
-        f"0.3 they are gone after {mean_s:.0f} s in the mean; with a fifth of it {len(slack)} of {len(seeds)} flights "
-        "come below 10 degrees for good within 40 s.",
-        seeds=len(seeds),
-        draw=draw,
-    )
-
-
 def _sensitivity(seeds: Sequence[int]) -> Finding:
     boards = {"ADXRS401, 15 mV/(deg/s)": "devboard_green", "LISY300AL, 3.3 mV/(deg/s)": "devboard_red"}
     flown = {gyro: flights("turns_180", seeds, {"suite": suite}) for gyro, suite in boards.items()}
@@ -301,6 +199,42 @@ def _sensitivity(seeds: Sequence[int]) -> Finding:
         told=f"The same turns in the same wind: {dear:.2f} degrees RMS with gyros of 15 mV/(deg/s), {cheap:.2f} with "
         "gyros of 3.3, whose counts are almost five times as coarse.",
         seeds=len(seeds),
+        draw=draw,
+    )
+
+
+BIAS_G, LONG_S = 0.02, 600.0
+GYRO_DEG_S = 0.1
+
+
+def _no_accumulation(_seeds: Sequence[int]) -> Finding:
+    log = sensed(StraightLevel(), LONG_S)
+    t_s, start = log.truth["t_s"], log.truth["R_eb"][0]
+    rows = log.measured.copy()
+    rows["force_b_m_s2"][:, 1] += BIAS_G * 9.80665
+    leaning = inclination_deg(begin(Premerlani(), start).replay(rows)["R_eb"], log)
+    offset = np.radians([GYRO_DEG_S, 0.0, 0.0])
+    turning = inclination_deg(begin(GyroOnly(), start).replay(misread(log, offset_rad_s=offset))["R_eb"], log)
+    minute = round(MINUTE_S * IMU_HZ) - 1
+    expected = math.degrees(math.asin(BIAS_G))
+
+    def draw(figure: Figure) -> None:
+        (ax,) = axes(figure, "An offset of either, for ten minutes of straight flight")
+        ax.plot(t_s / 60.0, turning, color=ORANGE, label="gyro, 0.1 deg/s, uncorrected")
+        ax.plot(t_s / 60.0, leaning, color=BLUE, label="accelerometer, 0.02 g")
+        ax.legend()
+        label(ax, "time, min", "inclination error, deg")
+
+    return Finding(
+        stands=(
+            line("accelerometer: ten minutes over one", "", leaning[-1] / leaning[minute], "<=", 1.1),
+            line("accelerometer: ten minutes, apart from asin 0.02", "deg", abs(leaning[-1] - expected), "<=", 0.1),
+            line("gyro: ten minutes over one", "", turning[-1] / turning[minute], ">=", 9.0),
+        ),
+        told=f"An accelerometer that is off by 0.02 g tilts the estimate by {leaning[minute]:.2f} degrees after a "
+        f"minute and by {leaning[-1]:.2f} after ten; an uncorrected gyro offset of 0.1 deg/s by "
+        f"{turning[minute]:.0f} and {turning[-1]:.0f}.",
+        seeds=0,
         draw=draw,
     )
 
@@ -350,25 +284,14 @@ CLAIMS = (
         seeds=0,
     ),
     Claim(
-        name="area_not_seen",
-        title="A saturated gyro loses the area it did not see",
+        name="accelerometer_offset",
+        title="Offsets of accelerometers do not add up",
         paper=Paper.THEORY,
-        place=f"{CHARACTERISTICS}, Saturation",
-        says="A gyro beyond its range leaves an angular error equal to the area between the actual rate and the "
-        "saturated one.",
+        place="Accelerometers, on the choice of one",
+        says="Accelerometers are less critical than gyros: they measure orientation itself, so a change of their "
+        "offset makes an error that stays as it is, where a gyro's accumulates.",
         expected=Verdict.CONFIRMED,
-        measure=_area_not_seen,
+        measure=_no_accumulation,
         seeds=0,
-    ),
-    Claim(
-        name="saturation_erased",
-        title="Feedback erases what saturation left in about 10 s",
-        paper=Paper.THEORY,
-        place=f"{CHARACTERISTICS}, Saturation",
-        says="The simplest way with saturation are feedback gains large enough to erase the error in a reasonable "
-        "time, of the order of 10 seconds.",
-        expected=Verdict.CONFIRMED,
-        measure=_saturation_erased,
-        seeds=5,
     ),
 )

@@ -94,4 +94,5 @@ def _cells(row: Row) -> str:
     """Name, measured value and limit, with units, as three cells."""
     unit = f" {row.unit}" if row.unit else ""
     limit = f"{'≤' if row.sense == '<=' else '≥'} {console.figures(row.limit)}{unit}"
-    return f"{row.name} | {console.figures(row.measured)}{unit} | {limit}"
+    name = row.name.replace("|", r"\|")  # a bar would end the cell
+    return f"{name} | {console.figures(row.measured)}{unit} | {limit}"

@@ -89,7 +89,8 @@ def figures(value: float) -> str:
         return "0"
     if not 1e-3 <= abs(value) < 1e5:
         return f"{value:.1e}"
-    return f"{value:.{max(0, 2 - math.floor(math.log10(abs(value))))}f}"
+    size = abs(float(f"{value:.2e}"))  # rounded first: 9.996 is 10.0
+    return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
 
 
 def verdict_table(title: str, rows: Sequence["Row"], written: Callable[[float], str] = number) -> "Table":
