@@ -168,6 +168,7 @@ def _yaw_lock(seeds: Sequence[int]) -> Finding:
             course.plot(error.t_s, error.value, color=BLUE, lw=1)
         course.axhline(LOCKED_DEG, color=FAINT, ls="--", lw=1)
         course.annotate("locked below 15 deg", (8.0, LOCKED_DEG + 4.0), color=FAINT, ha="right")
+        course.set_yticks((0.0, 45.0, 90.0, 135.0, 180.0))
         label(course, "s after the release", "heading less course, deg")
         for w in WEIGHTS:
             found = [t for t in times[w] if math.isfinite(t)]
@@ -177,7 +178,9 @@ def _yaw_lock(seeds: Sequence[int]) -> Finding:
         by_weight.set_xscale("log")
         by_weight.set_xticks(WEIGHTS, [f"{w:g}" for w in WEIGHTS])
         by_weight.minorticks_off()
+        by_weight.set_xlim(0.07, 3.4)
         by_weight.set_ylim(0.0, 20.0)
+        by_weight.set_yticks((0.0, 5.0, 10.0, 15.0, 20.0))
         label(by_weight, "weight of the yaw correction", "s after the release")
 
     gentle = sum(t > LOCK_SOON_S or math.isnan(t) for t in times[0.3])
