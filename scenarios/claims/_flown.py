@@ -76,3 +76,8 @@ def slowest(times_s: Iterable[float]) -> float:
     """The longest of some times; NaN if one never came or there are none."""
     times = list(times_s)
     return max(times) if times and not any(map(math.isnan, times)) else math.nan
+
+
+def median(times_s: Iterable[float]) -> float:
+    """The middle one of some times, of which one that never came counts as the longest; infinite if most never came."""
+    return float(np.median([math.inf if math.isnan(t) else t for t in times_s]))

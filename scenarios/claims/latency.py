@@ -20,7 +20,7 @@ from sim.prescribed_plant import CALM, Kinematics, rotation_from_euler
 
 COURSE = heading_error_deg("course")
 SETTLED_S = 20.0
-SMALL_DEG = 10.0  # a heading error that navigation hardly sees: a mile is missed by a sixth
+SMALL_DEG = 10.0  # a heading error that navigation hardly sees: sideways it is a sixth of the way
 LOST_DEG = 45.0  # one that leads astray
 
 
@@ -234,7 +234,8 @@ def _lag_filter(seeds: Sequence[int]) -> Finding:
         steep = bank_size_deg(flown["filtered"][0]).value > TURNING_DEG
         ax.fill_between(time_s(flown["filtered"][0]), -90, 90, where=steep, color=FAINT, alpha=0.15, lw=0)
         ax.set_xlim(SETTLED_S, 160.0)
-        ax.set_ylim(-80.0, 80.0)
+        ax.set_ylim(-105.0, 85.0)
+        ax.set_yticks((-90, -45, 0, 45))
         ax.legend(loc="lower left", ncols=3)
         label(ax, "s (grey: turning)", "deg")
 
