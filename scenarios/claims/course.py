@@ -174,8 +174,9 @@ def _large_weight(seeds: Sequence[int]) -> Finding:
             ax.set_xscale("log")
             ax.set_xticks(WEIGHTS, [f"{w:g}" for w in WEIGHTS])
             ax.minorticks_off()
-            ax.set_ylim(0.0)
             label(ax, "weight of the yaw correction", unit)
+        head.set_ylim(0.0, 25.0)
+        down.set_ylim(0.0, 5.0)
 
     return Finding(
         stands=(line("heading error at a weight of 2.4, over that at 0.3", "", gained(False), "<=", 0.8),),
@@ -251,7 +252,7 @@ def _wind_vector(seeds: Sequence[int]) -> Finding:
             series = wind_error_m_s(flight)
             learnt.plot(series.t_s, series.value, color=GREEN, lw=1)
         learnt.axhline(1.0, color=FAINT, ls="--", lw=1)
-        learnt.set_ylim(0.0, 5.0)
+        learnt.set_ylim(0.0, 2.5)
         label(learnt, "s (turns at 25, 70 and 115 s)", "m/s")
         for flown, series_of, colour, name in (
             (adapting, COURSE, ORANGE, "adapts: against the course"),
@@ -261,7 +262,7 @@ def _wind_vector(seeds: Sequence[int]) -> Finding:
             n = min(map(len, squares))
             mean = np.sqrt(np.mean([square[:n] for square in squares], axis=0))
             heading.plot(SETTLED_S + np.arange(n) * flown[0].dt_s, mean, color=colour, label=name)
-        heading.set_ylim(0.0, 65.0)
+        heading.set_ylim(0.0, 45.0)
         heading.legend(loc="upper right")
         label(heading, "s", "deg, RMS of the flights")
 
