@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from estimator.compiled import write_estimate
 from estimator.jit import kernel
 from estimator.premerlani import Premerlani, step
 from scenarios.claims._flown import pooled_rms, tuned
@@ -31,10 +32,17 @@ def _step_as_if_standing(rows, k, state):  # type: ignore[no-untyped-def]
     return step(rows, k, state)
 
 
+@kernel
+def _replay_as_if_standing(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        write_estimate(state[0], _step_as_if_standing(rows, k, state), estimates[k])
+
+
 class Uncompensated(Premerlani):
     """The paper's estimator without Eqn 25: what the accelerometer feels is taken for gravity."""
 
     _step = staticmethod(_step_as_if_standing)
+    _replay = staticmethod(_replay_as_if_standing)
 
 
 def _centrifugal(seeds: Sequence[int]) -> Finding:
@@ -67,9 +75,9 @@ def _centrifugal(seeds: Sequence[int]) -> Finding:
             line("part of the error that the term leaves", "", good / bad, "<=", 0.25),
             line("without it: flights that come down", "%", down, ">=", 90.0),
         ),
-        told=f"Held at {bank:.0f} degrees of bank in calm air, the matrix is off by {good:.1f} degrees RMS. Without the "
-        f"centrifugal term the accelerometer levels it against the turn: {bad:.0f} degrees; the bank sways "
-        f"between {swayed.min():.0f} and {swayed.max():.0f} degrees, and after {ended_s:.0f} s the aeroplane has come down "
+        told=f"Held at {bank:.0f} degrees of bank in calm air, the matrix is off by {good:.1f} degrees RMS. Without "
+        f"the centrifugal term the accelerometer levels it against the turn: {bad:.0f} degrees; the bank sways between "
+        f"{swayed.min():.0f} and {swayed.max():.0f} degrees, and after {ended_s:.0f} s the aeroplane has come down "
         "from 200 m to the ground.",
         seeds=len(seeds),
         draw=draw,

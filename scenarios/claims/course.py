@@ -182,10 +182,10 @@ def _large_weight(seeds: Sequence[int]) -> Finding:
         stands=(line("heading error at a weight of 2.4, over that at 0.3", "", gained(False), "<=", 0.8),),
         condition="if the lag of the receiver is matched on the matrix's side",
         under=(line("heading error at a weight of 2.4, over that at 0.3", "", gained(True), "<=", 0.8),),
-        told="In reversals in wind a larger weight brings nothing once it is above 0.3, as long as the lag of the GPS is "
-        f"ignored: {heading[False][1]:.0f} degrees RMS of heading error at 0.3 and {heading[False][-1]:.0f} at 2.4, and "
-        f"the tilt goes from {tilt[False][0]:.1f} to {tilt[False][-1]:.1f}. With the lag matched the heading error falls "
-        f"from {heading[True][0]:.0f} degrees at 0.1 to {heading[True][-1]:.0f} at 2.4, and the tilt with it.",
+        told="In reversals in wind a larger weight brings nothing once it is above 0.3, as long as the lag of the GPS "
+        f"is ignored: {heading[False][1]:.0f} degrees RMS of heading error at 0.3 and {heading[False][-1]:.0f} at 2.4, "
+        f"and the tilt error goes from {tilt[False][0]:.1f} to {tilt[False][-1]:.1f}. With the lag matched the heading "
+        f"error falls from {heading[True][0]:.0f} degrees at 0.1 to {heading[True][-1]:.0f} at 2.4; the tilt stays.",
         seeds=len(seeds),
         draw=draw,
     )
@@ -229,9 +229,9 @@ def _recovery(seeds: Sequence[int]) -> Finding:
             line("slowest from 60 deg off to within 10, W_Y = 0.3", "s", slowest(lock[0.3]), "<=", RECOVERY_S),
             line("slowest after a turn in wind, W_Y = 0.3", "s", after[0.3], "<=", RECOVERY_S),
         ),
-        told=f"A heading 60 degrees wrong is within 10 degrees of the course after {median(lock[0.3]):.0f} s with a yaw "
-        f"weight of 0.3 and {median(lock[LARGE]):.1f} s with {LARGE:g}; with 0.1 {late} of {len(seeds)} flights take "
-        f"more than 10 s. After a turn in 5 m/s of wind it takes at most {after[0.3]:.1f} s with 0.3 and "
+        told=f"A heading 60 degrees wrong is within 10 degrees of the course after {median(lock[0.3]):.0f} s with a "
+        f"yaw weight of 0.3 and {median(lock[LARGE]):.1f} s with {LARGE:g}; with 0.1 {late} of {len(seeds)} flights "
+        f"take more than 10 s. After a turn in 5 m/s of wind it takes at most {after[0.3]:.1f} s with 0.3 and "
         f"{after[LARGE]:.1f} s with {LARGE:g}.",
         seeds=len(seeds),
         draw=draw,
@@ -307,7 +307,8 @@ CLAIMS = (
         title="The yaw correction should have a large weight",
         paper=Paper.THEORY,
         place="GPS, reasons for a large weight",
-        says="For the yaw lock, for wind and after vertical flight it is best to give the yaw correction a large weight.",
+        says="For the yaw lock, for wind and after vertical flight it is best to give the yaw correction a large "
+        "weight.",
         expected=Verdict.WITH_CONDITION,
         measure=_large_weight,
         seeds=3,

@@ -13,7 +13,7 @@ from scenarios.claims._flown import PUBLISHED, TURNING_DEG, course_error_deg, po
 from scenarios.claims._open_loop import sensed
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import bank_size_deg, heading_error_deg, time_s
 from sim.log import Phase
 from sim.prescribed_plant import CALM, Kinematics, rotation_from_euler
@@ -123,8 +123,8 @@ def _report_rate(seeds: Sequence[int]) -> Finding:
             line("gained by a receiver without the filter, over that", "", by_filter / by_rate, ">=", 1.5),
         ),
         told=f"With the same latency 5 Hz instead of 1 Hz take {by_rate:.0%} off the heading error of turns "
-        f"({slow:.1f} to {quick:.1f} degrees), a receiver without its 1 s filter {by_filter:.0%}. But where a report is "
-        f"as late as its period, as the paper says it usually is, 5 Hz take off {with_latency:.0%}.",
+        f"({slow:.1f} to {quick:.1f} degrees), a receiver without its 1 s filter {by_filter:.0%}. But where a "
+        f"report is as late as its period, as the paper says it usually is, 5 Hz take off {with_latency:.0%}.",
         seeds=len(seeds),
         draw=draw,
     )
@@ -246,8 +246,8 @@ def _lag_filter(seeds: Sequence[int]) -> Finding:
         ),
         told=f"The filter on the matrix's side takes the heading error of turns in wind from {ignored:.1f} degrees RMS "
         f"to {filtered:.1f}, far more than the small improvement that the paper sees in it; with the paper's bare "
-        f"equations it is {pooled_rms(published, COURSE, SETTLED_S):.1f}. With the corrections taken out of its loop it "
-        f"is {freed:.1f}.",
+        f"equations it is {pooled_rms(published, COURSE, SETTLED_S):.1f}. With the corrections taken out of its loop "
+        f"it is {freed:.1f}.",
         seeds=len(seeds),
         draw=draw,
     )

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from estimator.interface import Array
 from estimator.rotation import inclination_error_rad
@@ -29,7 +30,7 @@ def _pitch_deg(R_eb: Array) -> Array:
     return np.degrees(-np.arcsin(np.clip(R_eb[:, 2, 0], -1.0, 1.0)))
 
 
-def _between(flight: Flight, from_s: float, to_s: float) -> Array:
+def _between(flight: Flight, from_s: float, to_s: float) -> NDArray[np.bool_]:
     t_s = time_s(flight)
     return (t_s > from_s) & (t_s <= to_s)
 

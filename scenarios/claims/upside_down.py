@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from autopilot.guidance import heading_error
 from estimator.interface import Array
 from estimator.premerlani import Premerlani
-from estimator.rotation import heading_rad
 from scenarios.claims._open_loop import begin, inclination_deg, sensed
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, axes, label
@@ -57,7 +56,9 @@ def _steering_error_deg(R_eb: Array, log: Log) -> Array:
 
 
 def _upside_down(_seeds: Sequence[int]) -> Finding:
-    logs = {way: sensed(motion, FLOWN_S) for way, motion in (("back", OnItsBack(BANK_RAD)), ("belly", SteadyTurn(BANK_RAD)))}
+    logs = {
+        way: sensed(motion, FLOWN_S) for way, motion in (("back", OnItsBack(BANK_RAD)), ("belly", SteadyTurn(BANK_RAD)))
+    }
     found, steering, tilt = {}, {}, {}
     for way, log in logs.items():
         roll_rad = math.pi if way == "back" else 0.0
@@ -74,7 +75,7 @@ def _upside_down(_seeds: Sequence[int]) -> Finding:
     off, off_belly = (float(steering[way][later].max()) for way in ("back", "belly"))
 
     def draw(figure: Figure) -> None:
-        error, elements = axes(figure, "Deviation from a direction asked for: error", "On its back: what the matrix tells")
+        error, elements = axes(figure, "Which way to turn: error", "On its back: what the matrix tells")
         t_s = logs["back"].truth["t_s"]
         error.plot(t_s, steering["back"], color=BLUE, label="on its back")
         error.plot(t_s, steering["belly"], "--", color=ORANGE, label="upright", lw=1.2)
@@ -95,9 +96,9 @@ def _upside_down(_seeds: Sequence[int]) -> Finding:
             line("ticks at which r_zz has the wrong sign", "", sign_wrong, "<=", 0.0),
             line("rate of turn about the vertical: error", "deg/s", rate_error, "<=", 0.5),
         ),
-        told=f"In turns on its back, the heading 40 degrees wrong at first, the deviation from any direction is told to "
-        f"{off:.1f} degrees by cross and dot product once yaw is locked (upright: {off_belly:.1f}), the rate of turn to "
-        f"{rate_error:.2f} deg/s, and r_zz is negative all the time.",
+        told=f"In turns on its back, the heading 40 degrees wrong at first, the deviation from any direction is "
+        f"told to {off:.1f} degrees by cross and dot product once yaw is locked (upright: {off_belly:.1f}), the rate "
+        f"of turn to {rate_error:.2f} deg/s, and r_zz is negative all the time.",
         seeds=0,
         draw=draw,
     )
