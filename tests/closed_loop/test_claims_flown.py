@@ -49,7 +49,7 @@ def test_dive_claim_is_refuted_where_the_accelerometer_gets_a_matrix(monkeypatch
 def test_large_weight_locks_sooner_than_a_small_one():
     """Four times the weight finds the heading in less than half the time, seed by seed."""
     for large, small in zip(*([launch._lock_s(f) for f in _thrown(w)] for w in (1.2, 0.3)), strict=True):
-        assert large < 0.5 * small or small < 1.0  # seed 1 happens to be thrown nearly north: known from the start
+        assert large < 0.5 * small or small < 1.0  # seed 1 is thrown nearly north: as believed at power-up
 
 
 def _thrown(w_y):
@@ -57,9 +57,9 @@ def _thrown(w_y):
 
 
 def test_uncompensated_estimator_is_drawn_to_the_felt_vertical():
-    """Without Eqn 25 the tilt error of a steady turn is bank W / sqrt(W^2 + rate^2): a first-order lag on what goes round.
+    """Without Eqn 25 the tilt error of a steady turn is bank W / sqrt(W^2 + rate^2).
 
-    The felt vertical leans by the bank and turns with the aeroplane; the correction follows it with the rate W.
+    The felt vertical leans by the bank and turns with the aeroplane; the correction lags it by 1 / W.
     """
     turn = SteadyTurn(math.radians(10.0))
     log = sensed(turn, 60.0)
@@ -67,9 +67,7 @@ def test_uncompensated_estimator_is_drawn_to_the_felt_vertical():
     estimator = begin(Uncompensated(PremerlaniParams(w_rp=weight, w_y=0.0, k_i=0.0)), log.truth["R_eb"][0])
     tilt_deg = inclination_deg(estimator.replay(log.measured)["R_eb"], log)[-1]
     expected_deg = 10.0 * weight / math.hypot(weight, turn.turn_rate_rad_s)
-    assert tilt_deg == pytest.approx(
-        expected_deg, rel=0.03, abs=0
-    )  # sine for angle: 0.5 % at 10 deg; gyro without drift
+    assert tilt_deg == pytest.approx(expected_deg, rel=0.03, abs=0)  # sine for angle: 0.5 %
 
 
 def test_turn_on_its_back_feels_its_weight_on_the_belly_side():
