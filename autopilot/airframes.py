@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
 from autopilot.guidance import GuidanceParams
 from autopilot.launch import LaunchParams
@@ -22,6 +23,7 @@ class AutopilotParams:
     """All gains and limits, a group for each part; the defaults fly the aeroplane `endurance`."""
 
     stabilise: StabiliseParams = field(default_factory=StabiliseParams)
+    energy: EnergyParams = field(default_factory=EnergyParams)
     guidance: GuidanceParams = field(default_factory=GuidanceParams)
     launch: LaunchParams = field(default_factory=LaunchParams)
     mixer: MixerParams = field(default_factory=MixerParams)
@@ -45,6 +47,8 @@ _GENTLE_LADY = AutopilotParams(
         roll_control_per_error=0.1,
         pitch_gain_1_s=2.0,
         pitch_rate_limit_rad_s=0.5,
+        recovery_roll_rate_rad_s=0.5,
+        recovery_pitch_rate_rad_s=0.8,
         elevator_per_pitch_rate_s=0.2,
         elevator_per_rate_error_s=0.2,
         elevator_per_pitch_error=0.6,
@@ -59,14 +63,24 @@ _GENTLE_LADY = AutopilotParams(
     guidance=GuidanceParams(
         bank_per_heading=0.35,  # a slow aeroplane turns twice as quickly at the same bank, and banks more slowly
         bank_limit_rad=math.radians(28.0),
-        airspeed_m_s=_GLIDE_M_S,
         turn_back_m=45.0,
-        # No height is worth a slower flight: the pitch is the glide's in every mode that would hold one.
+    ),
+    energy=EnergyParams(
+        airspeed_m_s=_GLIDE_M_S,
+        stall_m_s=4.56,
+        best_glide_m_s=6.3,
+        fastest_m_s=10.0,
+        inverted_m_s=math.nan,  # the dihedral by which the rudder rolls it would roll it over again
+        inverted_stall_m_s=math.nan,
+        # No height is worth a slower flight: the pitch is the glide's, or holds its speed where that is known.
         climb_per_height_1_s=0.0,
-        pitch_per_climb_rad_m=0.0,
+        height_weight=0.0,
         pitch_trim_rad=_GLIDE_PITCH_RAD,
+        pitch_per_lift_rad=math.radians(8.0),  # of the glide: the path steepens too
         throttle_trim=0.0,
+        throttle_per_speed_s_m=0.0,
         throttle_per_climb_s_m=0.0,
+        throttle_per_height_1_m=0.0,
         throttle_least=0.0,
     ),
     launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),

@@ -8,17 +8,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.airframes import AutopilotParams, params_of
+from autopilot.energy import (
+    believe_airspeed,
+    believe_headwind,
+    hold_height,
+    throttle_for,
+    throttle_to_recover,
+    want_airspeed,
+)
 from autopilot.failsafe import circle, examine, listen, mode_in_force
 from autopilot.guidance import (
+    agility,
     bank_for_heading,
     bank_to_return,
     direction_of_travel,
     gps_age,
     heading_error,
     height,
-    hold_height,
-    throttle_for,
     unseen_turn,
+    way_wanted,
 )
 from autopilot.interface import MOST_WAYPOINTS, ActuatorCommand, Mode, Setpoint
 from autopilot.launch import climb_away, feel_throw
@@ -51,6 +59,14 @@ _STATE = np.dtype(
         ("roll_integral", "f8"),  # aileron and elevator held by the integrals
         ("pitch_integral", "f8"),
         ("climb_integral_rad", "f8"),  # pitch held by the integral of the climb missing
+        ("throttle_integral", "f8"),  # and throttle by that of the energy missing
+        ("inverted", "i8"),  # flown on its back
+        ("airspeed_m_s", "f8"),  # believed
+        ("airspeed_known", "i8"),  # measured, or from GPS and wind
+        ("air_left_s", "f8"),  # for so long the airspeed last measured is believed
+        ("airspeed_wanted_m_s", "f8"),
+        ("ground_m_s", "f8"),  # speed over the ground, NaN where nobody knows
+        ("headwind_m_s", "f8"),  # against the way to be flown
         ("unseen_turn_rad", "f8"),  # turned, but not yet in the GPS course
         ("outbound", "i8"),  # the launch point was passed and is being left behind
         ("felt_m_s2", "f8"),  # mean acceleration along the nose
@@ -85,7 +101,7 @@ _DT_LIMIT_S = 0.1  # a longer sample interval is a gap; the integrals do not tak
 def ask(mode, s):  # type: ignore[no-untyped-def]
     """Take note of a mode newly asked for: a launch waits for a throw of its own."""
     if mode == LAUNCH:
-        s.roll_integral = s.pitch_integral = s.felt_m_s2 = s.climb_integral_rad = 0.0
+        s.roll_integral = s.pitch_integral = s.felt_m_s2 = s.climb_integral_rad = s.throttle_integral = 0.0
         s.thrown_s = -1.0
         s.levelled_off = 0
     s.asked_mode = mode
@@ -105,6 +121,19 @@ def enter(mode, led_by, height_m, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def reckon_speed(wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
+    """On which side one flies, how fast one would, and how fast one does, into the state."""
+    s, e = me.s, me.p.energy
+    s.inverted = me.asked.inverted and s.mode in (STABILISE, COURSE) and math.isfinite(e.inverted_m_s)
+    travels = s.led_by in (COURSE, RETURN, LOITER, WAYPOINTS)
+    if travels:
+        towards_north, towards_east = way_wanted(me.asked, row, s, me.p.guidance)
+        believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, me.p, dt_s)
+    want_airspeed(me.asked, travels, s, e)
+    believe_airspeed(wind_e_m_s, row, s, me.p, dt_s)
+
+
+@kernel
 def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
     """Bank and pitch demand, rad, and throttle of the modes that go somewhere, each by way of a height."""
     asked, s, p, failsafe = me.asked, me.s, me.p.guidance, me.p.failsafe
@@ -114,7 +143,9 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
         limit_rad = max(limit_rad, failsafe.bank_rad)
     if s.mode == LOW:
         limit_rad = min(limit_rad, failsafe.low_bank_rad)
-    r_zy = R_eb[2, 1]
+    if not me.on_nose:
+        limit_rad *= agility(s, me.p.energy.airspeed_m_s, p)
+    r_zy = -R_eb[2, 1] if s.inverted else R_eb[2, 1]
     if s.led_by == RETURN:
         bank = bank_to_return(north, east, r_zy, row, s, limit_rad, p)
     elif s.led_by == LOITER:
@@ -131,22 +162,22 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
         bank = bank_for_heading(sine, cosine, r_zy, limit_rad, p)
     if s.mode == LOW:
         wanted_m = max(wanted_m, height_m + failsafe.climb_m)
-    pitch, throttle = hold_height(wanted_m, row, s, p, dt_s)
+    pitch, throttle = hold_height(wanted_m, row, s, me.p, dt_s)
     return bank, pitch, throttle
 
 
 @kernel
 def guide(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
     """Bank and pitch demand, rad, and throttle of the modes that hold an attitude; `me` is the memory."""
-    asked, s, p = me.asked, me.s, me.p.guidance
+    asked, s = me.asked, me.s
     if s.mode == STABILISE:
-        return asked.bank_rad, asked.pitch_rad, throttle_for(asked.pitch_rad, p)
+        return asked.bank_rad, asked.pitch_rad, throttle_for(asked.pitch_rad, s, me.p.energy)
     if s.mode == LAUNCH:
         thrown_s = feel_throw(R_eb, row, s, me.p.launch, dt_s)
-        pitch, throttle = climb_away(thrown_s, asked.height_m, row, s, me.p.launch, p, dt_s)
+        pitch, throttle = climb_away(thrown_s, asked.height_m, row, s, me.p, dt_s)
         return 0.0, pitch, throttle
     if s.mode in (CIRCLE, GLIDE, LEVEL):
-        return circle(s.mode, row, s, me.p.failsafe, p, dt_s)
+        return circle(s.mode, row, s, me.p, dt_s)
     return lead(R_eb, wind_e_m_s, row, height_m, me, dt_s)
 
 
@@ -158,12 +189,15 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
     if s.mode == RATE:
         rate = asked.rate_b_rad_s
         demand = (rate[0], rate[1], rate[2])
-        throttle = me.p.guidance.throttle_trim
+        throttle = me.p.energy.throttle_trim
     else:
         bank, pitch, throttle = guide(R_eb, wind_e_m_s, row, height_m, me, dt_s)
-        demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, me.p.stabilise)
+        throttle = throttle_to_recover(R_eb[2, 0], pitch, throttle)
+        up = -1.0 if s.inverted else 1.0
+        demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, up, s.airspeed_m_s, me.p.stabilise)
     in_hand = s.mode == LAUNCH and s.thrown_s < 0.0
-    moved = rate_control(demand, R_eb, omega_b_rad_s, s, me.p.stabilise, 0.0 if in_hand else dt_s)
+    still_s = 0.0 if in_hand else dt_s
+    moved = rate_control(demand, R_eb, omega_b_rad_s, s.airspeed_m_s, s, me.p.stabilise, still_s)
     if math.isfinite(asked.throttle) and s.mode == asked.mode and not in_hand:
         throttle = asked.throttle
     aileron, elevator, rudder, throttle = mix(moved[0], moved[1], moved[2], throttle, me.p.mixer)
@@ -197,6 +231,7 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     if mode != s.mode or led_by != s.led_by:
         enter(mode, led_by, height_m, s)
     s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
+    reckon_speed(wind_e_m_s, row, me, dt_s)
     if mode == MANUAL:
         throttle = asked.throttle if math.isfinite(asked.throttle) else 0.0
         # The sticks are the surfaces: no trim, no mixing.

@@ -32,7 +32,8 @@ waypoint it was on the way to.
 import math
 from dataclasses import dataclass
 
-from autopilot.guidance import gps_age, hold_height
+from autopilot.energy import hold_height
+from autopilot.guidance import gps_age
 from autopilot.interface import Mode
 from estimator.interface import Health
 from estimator.jit import kernel
@@ -157,14 +158,14 @@ def mode_in_force(asked, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def circle(mode, row, s, p, g, dt_s):  # type: ignore[no-untyped-def]
+def circle(mode, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE and LEVEL, which go nowhere.
 
-    s : record of the height loop, and the height kept   p, g : records of FailsafeParams, GuidanceParams
+    s : record of the height loop, and the height kept   p : record of AutopilotParams
     """
-    bank_rad = 0.0 if mode == LEVEL else min(p.bank_rad, g.bank_limit_rad)
+    bank_rad = 0.0 if mode == LEVEL else min(p.failsafe.bank_rad, p.guidance.bank_limit_rad)
     if mode == GLIDE:
-        return bank_rad, p.glide_pitch_rad, 0.0
+        return bank_rad, p.failsafe.glide_pitch_rad, 0.0
     # The climb that the GPS shows holds the pitch that gyros alone would lose; without a height, level flight.
-    pitch_rad, throttle = hold_height(s.height_kept_m if mode == LEVEL else math.nan, row, s, g, dt_s)
+    pitch_rad, throttle = hold_height(s.height_kept_m if mode == LEVEL else math.nan, row, s, p, dt_s)
     return bank_rad, pitch_rad, throttle

@@ -1,4 +1,4 @@
-"""Where to fly: bank from the heading error, return to launch, and a slow height loop on a lagged GPS.
+"""Where to fly: bank from the heading error, and the return to launch.
 
 The heading error comes as the sine (cross product) and the cosine (dot product) of the direction of travel
 and the direction wanted, horizontal components only; it works at any attitude, upside down included.  A
@@ -10,9 +10,12 @@ Source: Premerlani & Bizard, Direction Cosine Matrix IMU: Theory, "Using DCM in 
 import math
 from dataclasses import dataclass
 
+from autopilot.interface import Mode
 from autopilot.stabilise import shorter_way
 from estimator.jit import kernel
 from estimator.kernels import clip
+
+COURSE, RETURN = int(Mode.COURSE), int(Mode.RETURN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,36 +24,23 @@ class GuidanceParams:
 
     bank_per_heading : bank demanded per unit of sine of the heading error; larger is quicker, then weaves
     bank_limit_rad : the steepest bank ever demanded to turn, whatever the set-point allows
-    airspeed_m_s : of cruise, to turn a nose direction and a wind into a direction over the ground
+    least_agility : the part of its bank that a turn into a strong wind keeps, see `agility`
+    wind_share : of the airspeed, the most wind that is steered with
     gps_filter_s : age of a fix beyond its time stamp, from the filter inside the receiver
     gps_patience_s : age of a fix after which it is no longer believed
     circling_bank_rad : flown where there is no position to return from
     passed_m, turn_back_m : nearer than the first is past the launch point; beyond the second it turns back
-    climb_per_height_1_s, climb_limit_m_s, sink_limit_m_s : climb demanded per height missing, and its limits
-    pitch_trim_rad : pitch of level flight at cruise       pitch_limit_rad : the steepest demanded
-    throttle_trim, throttle_per_climb_s_m : for level flight, and per climb rate
-    pitch_per_climb_rad_m, pitch_integral_limit_rad : integral of the climb missing, and the most it holds
-    throttle_least : keeps air over the tail
     """
 
     bank_per_heading: float = 1.2
     bank_limit_rad: float = math.radians(85.0)
-    airspeed_m_s: float = 12.6
+    least_agility: float = 0.3
+    wind_share: float = 0.8
     gps_filter_s: float = 1.0
     gps_patience_s: float = 5.0
     circling_bank_rad: float = math.radians(15.0)
     passed_m: float = 15.0
     turn_back_m: float = 60.0
-    climb_per_height_1_s: float = 0.25
-    climb_limit_m_s: float = 3.0
-    sink_limit_m_s: float = 2.0
-    pitch_trim_rad: float = math.radians(1.0)
-    pitch_limit_rad: float = math.radians(15.0)
-    throttle_trim: float = 0.6
-    throttle_per_climb_s_m: float = 0.085
-    pitch_per_climb_rad_m: float = 0.01
-    pitch_integral_limit_rad: float = math.radians(10.0)
-    throttle_least: float = 0.1
 
 
 @kernel
@@ -88,20 +78,36 @@ def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, p):  # type: ignore[n
 
     A matrix whose heading is locked to the course has it in its first column.  One whose heading is the nose
     needs the wind: nose x airspeed + wind; or, where nobody knows the wind, the GPS velocity, turned by
-    what it has not seen yet.
+    what it has not seen yet.  Of a wind near the airspeed or above it no more is counted than leaves the nose in
+    front: blown backwards one still points it homewards, and does not turn round to fly where one drifts.
 
-    R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured   s : record with `unseen_turn_rad`
+    R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured
+    s : record with `airspeed_m_s`, `unseen_turn_rad`
     """
     north, east = unit(R_eb[0, 0], R_eb[1, 0])
     if not on_nose:
         return north, east
     if math.isfinite(wind_e_m_s[0]) and math.isfinite(wind_e_m_s[1]):
-        return unit(p.airspeed_m_s * north + wind_e_m_s[0], p.airspeed_m_s * east + wind_e_m_s[1])
+        wind_m_s, most_m_s = math.hypot(wind_e_m_s[0], wind_e_m_s[1]), p.wind_share * s.airspeed_m_s
+        part = most_m_s / wind_m_s if wind_m_s > most_m_s else 1.0
+        return unit(s.airspeed_m_s * north + part * wind_e_m_s[0], s.airspeed_m_s * east + part * wind_e_m_s[1])
     v = row.gps_v_e_m_s
     if math.isfinite(gps_age(row, p)) and math.hypot(v[0], v[1]) > 3.0:
         cosine, sine = math.cos(s.unseen_turn_rad), math.sin(s.unseen_turn_rad)
         return unit(v[0] * cosine - v[1] * sine, v[0] * sine + v[1] * cosine)
     return north, east
+
+
+@kernel
+def agility(s, cruise_m_s, p):  # type: ignore[no-untyped-def]
+    """The part of the bank that may be used where the heading is a course, 0..1: ground speed over cruise speed.
+
+    A sideways acceleration a turns the course at a / v, v over the ground: into a strong wind many times as quickly
+    as the nose, and the late GPS, from which such an estimator has its course, can follow only so much.
+
+    s : record with `ground_m_s`
+    """
+    return clip(s.ground_m_s / cruise_m_s, p.least_agility, 1.0) if math.isfinite(s.ground_m_s) else 1.0
 
 
 @kernel
@@ -122,6 +128,30 @@ def bank_for_heading(sine, cosine, r_zy, limit_rad, p):  # type: ignore[no-untyp
 
 
 @kernel
+def way_home(row, p):  # type: ignore[no-untyped-def]
+    """(north, east) from here to the launch point, m: the last fix moved on by its age; NaN where there is none."""
+    age_s = gps_age(row, p)
+    if not math.isfinite(age_s):
+        return math.nan, math.nan
+    return -(row.gps_p_e_m[0] + age_s * row.gps_v_e_m_s[0]), -(row.gps_p_e_m[1] + age_s * row.gps_v_e_m_s[1])
+
+
+@kernel
+def way_wanted(asked, row, s, p):  # type: ignore[no-untyped-def]
+    """Direction (north, east) of the course or of the launch point, whichever leads; (0, 0) where neither does.
+
+    asked : record of the set-point   s : record with `led_by`, `outbound`
+    """
+    if s.led_by == COURSE:
+        return math.cos(asked.course_rad), math.sin(asked.course_rad)
+    if s.led_by == RETURN and not s.outbound:
+        north, east = way_home(row, p)
+        if math.isfinite(north):
+            return unit(north, east)
+    return 0.0, 0.0
+
+
+@kernel
 def bank_to_return(north, east, r_zy, row, s, limit_rad, p):  # type: ignore[no-untyped-def]
     """Bank demand, rad, that leads to the launch point, over it, away from it, and back again.
 
@@ -130,12 +160,10 @@ def bank_to_return(north, east, r_zy, row, s, limit_rad, p):  # type: ignore[no-
 
     north, east : direction of travel   row : measured   s : record with `outbound`, updated
     """
-    age_s = gps_age(row, p)
-    if not math.isfinite(age_s):
-        return clip(p.circling_bank_rad, -limit_rad, limit_rad)
-    home_north = -(row.gps_p_e_m[0] + age_s * row.gps_v_e_m_s[0])
-    home_east = -(row.gps_p_e_m[1] + age_s * row.gps_v_e_m_s[1])
+    home_north, home_east = way_home(row, p)
     distance_m = math.hypot(home_north, home_east)
+    if not math.isfinite(distance_m):
+        return clip(p.circling_bank_rad, -limit_rad, limit_rad)
     if distance_m < p.passed_m:
         s.outbound = 1
     elif distance_m > p.turn_back_m:
@@ -152,32 +180,3 @@ def height(row, p):  # type: ignore[no-untyped-def]
     """Height above the launch point now, m: the last fix moved on by its age; NaN where there is none."""
     age_s = gps_age(row, p)
     return -(row.gps_p_e_m[2] + age_s * row.gps_v_e_m_s[2]) if math.isfinite(age_s) else math.nan
-
-
-@kernel
-def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Pitch demand, rad, and throttle, 0..1, that lead slowly to a height and hold it.
-
-    Pitch and throttle follow the same climb demand, so that the speed, which nobody measures, stays near
-    cruise.  The integral takes up an estimate that is wrong in pitch; were it on the throttle, the speed
-    would pay for that error.  Without a height: level flight at cruise.
-
-    height_m : demanded   row : measured   s : record with `climb_integral_rad`, updated
-    """
-    missing_m = height_m - height(row, p)
-    climb_m_s = 0.0
-    if math.isfinite(missing_m):
-        climb_m_s = clip(p.climb_per_height_1_s * missing_m, -p.sink_limit_m_s, p.climb_limit_m_s)
-        climb_missing_m_s = clip(climb_m_s + row.gps_v_e_m_s[2], -5.0, 5.0)  # the velocity is down
-        integral_rad = s.climb_integral_rad + p.pitch_per_climb_rad_m * climb_missing_m_s * dt_s
-        s.climb_integral_rad = clip(integral_rad, -p.pitch_integral_limit_rad, p.pitch_integral_limit_rad)
-    pitch_rad = p.pitch_trim_rad + climb_m_s / p.airspeed_m_s + s.climb_integral_rad
-    throttle = p.throttle_trim + p.throttle_per_climb_s_m * climb_m_s
-    return clip(pitch_rad, -p.pitch_limit_rad, p.pitch_limit_rad), clip(throttle, p.throttle_least, 1.0)
-
-
-@kernel
-def throttle_for(pitch_rad, p):  # type: ignore[no-untyped-def]
-    """Throttle, 0..1, that goes with a held pitch at about cruise speed: where no height is held."""
-    climb_m_s = p.airspeed_m_s * math.sin(pitch_rad - p.pitch_trim_rad)
-    return clip(p.throttle_trim + p.throttle_per_climb_s_m * climb_m_s, p.throttle_least, 1.0)

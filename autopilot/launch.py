@@ -7,7 +7,8 @@ high in the hand is not a throw; sway and knocks are short against the mean that
 import math
 from dataclasses import dataclass
 
-from autopilot.guidance import height, hold_height, throttle_for
+from autopilot.energy import hold_height, throttle_for
+from autopilot.guidance import height
 from autopilot.stabilise import G_M_S2
 from estimator.jit import kernel
 
@@ -49,21 +50,22 @@ def feel_throw(R_eb, row, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def climb_away(thrown_s, height_m, row, s, p, guidance, dt_s):  # type: ignore[no-untyped-def]
+def climb_away(thrown_s, height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Pitch demand, rad, and throttle, 0..1, of a launch; wings level is the caller's.
 
     Waiting, motor off; thrown, full throttle and the climb; near the height, the height loop for good.
 
     thrown_s : since the throw, or negative   height_m : demanded   s : record with `levelled_off`, updated
-    p, guidance : records of LaunchParams, GuidanceParams
+    p : record of AutopilotParams
     """
+    launch = p.launch
     if thrown_s < 0.0:
-        return p.climb_pitch_rad, 0.0
-    if height(row, guidance) > height_m - p.level_off_m:  # False where there is no height
+        return launch.climb_pitch_rad, 0.0
+    if height(row, p.guidance) > height_m - launch.level_off_m:  # False where there is no height
         s.levelled_off = 1
     if s.levelled_off:
-        return hold_height(height_m, row, s, guidance, dt_s)
-    if thrown_s < p.motor_delay_s:
-        return p.climb_pitch_rad, 0.0
-    throttle = 1.0 if thrown_s < p.full_throttle_s else throttle_for(p.climb_pitch_rad, guidance)
-    return p.climb_pitch_rad, throttle
+        return hold_height(height_m, row, s, p, dt_s)
+    if thrown_s < launch.motor_delay_s:
+        return launch.climb_pitch_rad, 0.0
+    throttle = 1.0 if thrown_s < launch.full_throttle_s else throttle_for(launch.climb_pitch_rad, s, p.energy)
+    return launch.climb_pitch_rad, throttle

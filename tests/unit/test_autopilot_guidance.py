@@ -1,4 +1,4 @@
-"""Heading error, direction of travel, return to launch and the height loop, against plane geometry."""
+"""Heading error, direction of travel and return to launch, against plane geometry."""
 
 import math
 from dataclasses import astuple
@@ -18,14 +18,13 @@ from autopilot.guidance import (
     gps_age,
     heading_error,
     height,
-    hold_height,
-    throttle_for,
     unit,
     unseen_turn,
 )
 from estimator.interface import MEASURED_DTYPE
 
 PARAMS = GuidanceParams()
+CRUISE_M_S = 12.6
 LIMIT_RAD = math.radians(35.0)
 UNKNOWN = np.full(3, np.nan)
 compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
@@ -40,7 +39,9 @@ def record():
 
 
 def state():
-    return np.zeros(1, _STATE)[0]
+    s = np.zeros(1, _STATE)[0]
+    s["airspeed_m_s"] = CRUISE_M_S
+    return s
 
 
 def row_of(p_e_m=(0.0, 0.0, -50.0), v_e_m_s=(0.0, 0.0, 0.0), *, t_s=10.0, gps_t_s=9.7, valid=1):
@@ -94,7 +95,7 @@ def test_bank_for_heading_dead_astern_keeps_to_the_side_of_the_bank():
 def test_direction_of_travel_nose_with_wind_is_the_wind_triangle(heading, blows_to, speed):
     """Nose times airspeed plus wind, as complex numbers."""
     wind = speed * np.array([math.cos(blows_to), math.sin(blows_to), 0.0])
-    over_ground = PARAMS.airspeed_m_s * np.exp(1j * heading) + speed * np.exp(1j * blows_to)
+    over_ground = CRUISE_M_S * np.exp(1j * heading) + speed * np.exp(1j * blows_to)
     north, east = direction_of_travel(nose(heading), wind, row_of(), state(), 1, record())
     np.testing.assert_allclose(north + 1j * east, over_ground / abs(over_ground), rtol=0, atol=1e-9)
 
@@ -138,46 +139,6 @@ def test_height_climbing_is_moved_on_by_the_age_of_the_fix():
     np.testing.assert_allclose(height(row_of((0, 0, -30.0), (0, 0, -2.0)), record()), 32.6, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("height_m", "climb_m_s"), [(1000.0, 3.0), (52.0, 0.5), (50.0, 0.0), (48.0, -0.5), (0.0, -2.0)]
-)
-def test_hold_height_demands_a_limited_climb(height_m, climb_m_s):
-    """Climb per height missing, not above 3 m/s nor below -2 m/s; pitch and throttle follow together."""
-    pitch, throttle = hold_height(height_m, row_of(), state(), record(), 0.0)
-    expected = PARAMS.pitch_trim_rad + climb_m_s / PARAMS.airspeed_m_s
-    np.testing.assert_allclose(pitch, min(expected, PARAMS.pitch_limit_rad), rtol=0, atol=1e-12)
-    wanted = PARAMS.throttle_trim + PARAMS.throttle_per_climb_s_m * climb_m_s
-    np.testing.assert_allclose(throttle, max(wanted, PARAMS.throttle_least), rtol=0, atol=1e-12)
-
-
-def test_hold_height_sinking_against_the_demand_raises_the_nose_slowly_up_to_a_limit():
-    """An estimate that reads too nose-high: the climb missing is integrated into the pitch, not the throttle."""
-    s, p, row = state(), record(), row_of(v_e_m_s=(12.6, 0.0, 1.0))  # at 50 m, and sinking at 1 m/s
-    row["gps_p_e_m"] = (0.0, 0.0, -51.3)  # 1.3 s ago
-    first_pitch, first_throttle = hold_height(50.0, row, s, p, 0.02)
-    for _ in range(49):
-        pitch, throttle = hold_height(50.0, row, s, p, 0.02)
-    np.testing.assert_allclose(pitch - first_pitch, 0.98 * PARAMS.pitch_per_climb_rad_m, rtol=0, atol=1e-12)
-    assert throttle == first_throttle
-    for _ in range(5000):
-        hold_height(50.0, row, s, p, 0.02)
-    assert s["climb_integral_rad"] == PARAMS.pitch_integral_limit_rad
-
-
-def test_hold_height_without_gps_is_level_flight_at_cruise():
-    """No fix, no climb: trim pitch and trim throttle."""
-    demand = hold_height(100.0, row_of(valid=0), state(), record(), 0.02)
-    np.testing.assert_allclose(demand, (PARAMS.pitch_trim_rad, PARAMS.throttle_trim), rtol=0, atol=1e-12)
-
-
-def test_throttle_for_pitch_grows_and_stays_within_limits():
-    """More pitch, more throttle; never off, never above full."""
-    throttles = [throttle_for(math.radians(d), record()) for d in (-40.0, 0.0, 5.0, 60.0)]
-    assert throttles[0] == PARAMS.throttle_least
-    assert throttles[-1] == 1.0
-    assert throttles[0] < throttles[1] < throttles[2] < throttles[3]
-
-
 @compiled
 @given(bearing=course, flown=course, distance=st.floats(80.0, 2000.0))
 def test_bank_to_return_turns_towards_the_launch_point(bearing, flown, distance):
@@ -198,7 +159,7 @@ def test_bank_to_return_without_position_circles_gently():
 
 def fly_flat(start_m, course_rad, wind_m_s, seconds):
     """Positions (complex, north + i east) of a point that turns as its bank demands, at cruise in a wind."""
-    dt_s, g, v = 0.02, 9.80665, PARAMS.airspeed_m_s
+    dt_s, g, v = 0.02, 9.80665, CRUISE_M_S
     at, heading, bank, s, p = complex(*start_m), course_rad, 0.0, state(), record()
     path = []
     for _ in range(round(seconds / dt_s)):

@@ -22,7 +22,7 @@ from sim.sensors.suite import SUITES, Suite
 
 LEVEL = Setpoint(Mode.STABILISE, pitch_rad=math.radians(1.0))
 LADY = params_of("gentle_lady")
-GLIDE = Setpoint(Mode.STABILISE, pitch_rad=LADY.guidance.pitch_trim_rad)
+GLIDE = Setpoint(Mode.STABILISE, pitch_rad=LADY.energy.pitch_trim_rad)
 
 
 def flown(start, script, duration_s, *, air=STILL, seed=0, suite="ideal", aircraft="endurance", estimator=None):
@@ -129,7 +129,7 @@ def test_return_any_wind_passes_the_launch_point(from_deg):
 def test_sailplane_glide_settles_at_its_speed_with_wings_level():
     """Hands off in still air: the pitch of the glide gives the speed that the gains assume within 7 %."""
     truth = flown(InFlight(0.0), [(0.0, GLIDE)], 30.0, aircraft="gentle_lady")[-500:]
-    np.testing.assert_allclose(truth["airspeed_m_s"], LADY.guidance.airspeed_m_s, rtol=0.07, atol=0)
+    np.testing.assert_allclose(truth["airspeed_m_s"], LADY.energy.airspeed_m_s, rtol=0.07, atol=0)
     assert abs(bank_deg(truth)).max() < 1.0
     sink_m_s = -np.polyfit(truth["t_s"], height_m(truth), 1)[0]
     assert 0.4 < sink_m_s < 0.8
@@ -152,7 +152,7 @@ def test_sailplane_pitch_believed_too_low_is_slower_but_does_not_stall():
     wrong = ReadsNoseLow(math.radians(8.0))
     truth = flown(InFlight(0.0), [(0.0, Setpoint(Mode.COURSE))], 40.0, aircraft="gentle_lady", estimator=wrong)
     assert truth["airspeed_m_s"][-1000:].min() > 5.5
-    assert truth["airspeed_m_s"][-1000:].max() < 0.95 * LADY.guidance.airspeed_m_s
+    assert truth["airspeed_m_s"][-1000:].max() < 0.95 * LADY.energy.airspeed_m_s
     assert np.degrees(truth["alpha_rad"]).max() < 6.0
 
 

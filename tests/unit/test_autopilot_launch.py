@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from autopilot.airframes import AutopilotParams
 from autopilot.autopilot import _PARAMS, _STATE, DcmAutopilot
-from autopilot.guidance import GuidanceParams, hold_height, throttle_for
+from autopilot.energy import hold_height, throttle_for
 from autopilot.interface import Mode, Setpoint
 from autopilot.launch import LaunchParams, climb_away, feel_throw
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
@@ -16,13 +17,25 @@ from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
 G_M_S2 = 9.80665
 DT_S = 0.02
 PARAMS = LaunchParams()
-GUIDANCE = GuidanceParams()
 
 
 def record(group, params):
     p = np.zeros(1, _PARAMS[group])
     p[0] = astuple(params)
     return p[0]
+
+
+def everything():
+    p = np.zeros(1, _PARAMS)
+    for group in _PARAMS.names:
+        p[0][group] = astuple(getattr(AutopilotParams(), group))
+    return p[0]
+
+
+def cruising():
+    s = np.zeros(1, _STATE)[0]
+    s["airspeed_m_s"] = s["airspeed_wanted_m_s"] = AutopilotParams().energy.airspeed_m_s
+    return s
 
 
 def feel(forces_x, R_eb):
@@ -67,20 +80,20 @@ def test_feel_throw_push_of_2_75_g_is_felt_within_a_tenth_of_a_second(pitch_deg)
 
 def test_climb_away_follows_the_throw_from_no_power_to_the_height():
     """Motor off in the hand, then full, then that of the climb, which ends below the height for good."""
-    s, p, g = np.zeros(1, _STATE)[0], record("launch", PARAMS), record("guidance", GUIDANCE)
+    s, p = cruising(), everything()
     row = np.zeros(1, MEASURED_DTYPE)[0]
     row["gps_valid"] = 1
 
     def at(thrown_s, height_m):
         row["gps_p_e_m"] = (0.0, 0.0, -height_m)
-        return climb_away(thrown_s, 50.0, row, s, p, g, DT_S)
+        return climb_away(thrown_s, 50.0, row, s, p, DT_S)
 
     assert at(-1.0, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
     assert at(0.05, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
     assert at(0.3, 1.7) == (PARAMS.climb_pitch_rad, 1.0)
     assert at(PARAMS.full_throttle_s, 20.0) == (
         PARAMS.climb_pitch_rad,
-        throttle_for(PARAMS.climb_pitch_rad, g),
+        throttle_for(PARAMS.climb_pitch_rad, s, p["energy"]),
     )
     near_pitch, near_throttle = at(12.0, 49.0)
     assert near_pitch < PARAMS.climb_pitch_rad
@@ -88,8 +101,7 @@ def test_climb_away_follows_the_throw_from_no_power_to_the_height():
     assert s["levelled_off"] == 1
     s["climb_integral_rad"] = 0.0
     pitch, throttle = at(13.0, 40.0)  # below the height again: the height loop goes on, not the launch
-    afresh = np.zeros(1, _STATE)[0]
-    assert (pitch, throttle) == hold_height(50.0, row, afresh, g, DT_S)
+    assert (pitch, throttle) == hold_height(50.0, row, cruising(), p, DT_S)
 
 
 def test_launch_mode_in_the_hand_keeps_motor_off_and_learns_nothing():

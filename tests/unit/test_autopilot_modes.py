@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import sim.aircraft
 from autopilot.airframes import AutopilotParams, params_of
 from autopilot.autopilot import _PARAMS, DcmAutopilot
-from autopilot.guidance import GuidanceParams
+from autopilot.energy import EnergyParams
 from autopilot.interface import Mode, Setpoint
 from autopilot.mixer import MixerParams, mix
 from autopilot.pilot import Script, Timed, inside_loops, reversals
@@ -67,8 +67,8 @@ def test_course_demands_bank_towards_the_course_and_climb_towards_the_height():
     setpoint = Setpoint(Mode.COURSE, course_rad=math.pi / 2, height_m=80.0)
     command = DcmAutopilot().update(LEVEL, measurements(), setpoint)
     assert command.bank_demand_rad == setpoint.bank_limit_rad
-    assert command.pitch_demand_rad > GuidanceParams().pitch_trim_rad
-    assert command.throttle > GuidanceParams().throttle_trim
+    assert command.pitch_demand_rad > EnergyParams().pitch_trim_rad
+    assert command.throttle > EnergyParams().throttle_trim
 
 
 def test_course_nose_estimator_crabs_into_the_wind():
@@ -137,7 +137,7 @@ def test_sailplane_any_height_wanted_glides_and_never_pulls(mode, height_m):
     """Without a motor no height is worth a slower flight: the pitch is that of the glide, the motor is off."""
     sailplane = DcmAutopilot(aircraft="gentle_lady")
     wanted = Setpoint(mode, course_rad=2.0, height_m=height_m, throttle=1.0)
-    glide_rad = params_of("gentle_lady").guidance.pitch_trim_rad
+    glide_rad = params_of("gentle_lady").energy.pitch_trim_rad
     for sink_m_s in (-3.0, 0.5, 3.0):
         m = measurements(north_m=300.0, force_x=27.0)
         m.rows["gps_v_e_m_s"][0, 2] = sink_m_s

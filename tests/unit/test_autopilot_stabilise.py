@@ -13,7 +13,7 @@ from autopilot.autopilot import _PARAMS
 from autopilot.stabilise import (
     G_M_S2,
     StabiliseParams,
-    extra_load,
+    extra_lift,
     rate_control,
     rate_demand,
     roll_error,
@@ -24,6 +24,7 @@ from autopilot.stabilise import (
 ROUND_OFF = 1e-12  # a dozen products of numbers up to a few units
 PARAMS = StabiliseParams()
 STILL = np.zeros(3)
+CRUISE_M_S = PARAMS.airspeed_m_s
 compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
 angle = st.floats(-math.pi, math.pi)
 pitch = st.floats(-1.5, 1.5)
@@ -44,7 +45,7 @@ def state():
 
 
 def control_of(demand, R_eb, omega):
-    return rate_control(demand, R_eb, omega, state(), record(), 0.0)
+    return rate_control(demand, R_eb, omega, CRUISE_M_S, state(), record(), 0.0)
 
 
 @compiled
@@ -52,7 +53,7 @@ def control_of(demand, R_eb, omega):
 def test_roll_error_any_attitude_rolling_that_way_brings_the_wings_nearer(roll, pitch, yaw, bank):
     """A small body roll in the direction of the error turns the vertical towards the demanded one."""
     R = attitude(roll, pitch, yaw)
-    error = roll_error(R, STILL, bank)
+    error = roll_error(R, STILL, bank, 1.0)
     off = math.remainder(bank - roll, 2.0 * math.pi)
     if abs(off) < 1e-3 or abs(abs(off) - math.pi) < 1e-3:
         return  # there, or exactly opposite: either way is right
@@ -67,7 +68,7 @@ def test_roll_error_any_attitude_rolling_that_way_brings_the_wings_nearer(roll, 
 def test_roll_error_upright_for_wings_level_is_minus_r_zy(roll, pitch, yaw):
     """For wings level the error is the paper's r_zy, with the sign that removes it."""
     R = attitude(roll, pitch, yaw)
-    np.testing.assert_allclose(roll_error(R, STILL, 0.0), -R[2, 1], rtol=0, atol=ROUND_OFF)
+    np.testing.assert_allclose(roll_error(R, STILL, 0.0, 1.0), -R[2, 1], rtol=0, atol=ROUND_OFF)
 
 
 @compiled
@@ -78,22 +79,22 @@ def test_roll_error_level_nose_equals_sine_or_saturates(roll, yaw, bank):
     if abs(abs(missing) - math.pi / 2) < 1e-9 or abs(abs(missing) - math.pi) < 1e-9:
         return
     expected = math.sin(missing) if abs(missing) < math.pi / 2 else math.copysign(1.0, missing)
-    np.testing.assert_allclose(roll_error(attitude(roll, 0.0, yaw), STILL, bank), expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(roll_error(attitude(roll, 0.0, yaw), STILL, bank, 1.0), expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [95.0, 135.0, 179.0, -95.0, -135.0, -179.0])
 def test_roll_demand_inverted_is_saturated_the_shorter_way(degrees):
     """With r_zz < 0 the roll rate demanded is the limit, opposite to the bank."""
     R = attitude(math.radians(degrees), 0.1)
-    p, _, _ = rate_demand(R, STILL, 0.0, 0.0, record())
-    assert p == -math.copysign(PARAMS.roll_rate_limit_rad_s, degrees)
+    p, _, _ = rate_demand(R, STILL, 0.0, 0.0, 1.0, CRUISE_M_S, record())
+    assert p == -math.copysign(PARAMS.recovery_roll_rate_rad_s, degrees)
 
 
 def test_roll_demand_exactly_inverted_keeps_rolling_the_way_it_rolls():
     """Upside down within a degree, the roll under way decides, so that noise cannot hold it there."""
     for side in (-1.0, 1.0):
         R = attitude(math.pi + side * math.radians(1.0), 0.0)  # the shorter way is against the roll
-        assert roll_error(R, np.array([side, 0.0, 0.0]), 0.0) == side
+        assert roll_error(R, np.array([side, 0.0, 0.0]), 0.0, 1.0) == side
 
 
 @pytest.mark.parametrize("degrees", [91.0, 120.0, 180.0, -120.0, -91.0])
@@ -101,7 +102,7 @@ def test_roll_demand_exactly_inverted_keeps_rolling_the_way_it_rolls():
 def test_elevator_inverted_is_never_up(degrees, nose_deg):
     """Upside down up-elevator would pull towards the ground, whatever pitch is asked for."""
     R = attitude(math.radians(degrees), math.radians(nose_deg))
-    demand = rate_demand(R, STILL, 0.0, math.radians(15.0), record())
+    demand = rate_demand(R, STILL, 0.0, math.radians(15.0), 1.0, CRUISE_M_S, record())
     assert demand[1] <= 0.0
     assert control_of(demand, R, STILL)[1] <= 0.0
 
@@ -113,8 +114,8 @@ def test_pitch_demand_upright_turns_the_nose_towards_the_demand(roll, pitch, wan
     if abs(wanted - pitch) < 1e-2:
         return
     R = attitude(roll, pitch, yaw)
-    _, q, _ = rate_demand(R, STILL, roll, wanted, record())
-    q -= turn_rate(R, PARAMS.airspeed_m_s) * R[2, 1]
+    _, q, _ = rate_demand(R, STILL, roll, wanted, 1.0, CRUISE_M_S, record())
+    q -= turn_rate(R, 1.0, CRUISE_M_S) * R[2, 1]
     turned = R @ Rotation.from_rotvec([0.0, 1e-4 * np.sign(q), 0.0]).as_matrix()
     assert np.sign(-turned[2, 0] + R[2, 0]) == np.sign(wanted - pitch)
 
@@ -124,9 +125,11 @@ def test_pitch_demand_upright_turns_the_nose_towards_the_demand(roll, pitch, wan
 def test_rate_demand_coordinated_turn_is_the_turn_seen_in_the_body(bank, yaw):
     """Banked as demanded, nose level: the demand is R^T (0, 0, g tan(bank) / V), pitch and yaw rate alike."""
     R = attitude(bank, 0.0, yaw)
-    turning = G_M_S2 * math.tan(bank) / PARAMS.airspeed_m_s
+    turning = G_M_S2 * math.tan(bank) / CRUISE_M_S
     expected = Rotation.from_matrix(R).inv().apply([0.0, 0.0, turning])
-    np.testing.assert_allclose(rate_demand(R, STILL, bank, 0.0, record()), expected, rtol=0, atol=ROUND_OFF)
+    np.testing.assert_allclose(
+        rate_demand(R, STILL, bank, 0.0, 1.0, CRUISE_M_S, record()), expected, rtol=0, atol=ROUND_OFF
+    )
 
 
 @compiled
@@ -134,20 +137,20 @@ def test_rate_demand_coordinated_turn_is_the_turn_seen_in_the_body(bank, yaw):
 def test_rate_control_coordinated_turn_does_not_leak_into_the_pitch_damping(bank):
     """The mixing problem: in a true turn the elevator is the one of the load alone, none of it damps the turn."""
     R = attitude(bank, 0.0)
-    omega = R.T @ [0.0, 0.0, G_M_S2 * math.tan(bank) / PARAMS.airspeed_m_s]
+    omega = R.T @ [0.0, 0.0, G_M_S2 * math.tan(bank) / CRUISE_M_S]
     undamped = StabiliseParams(
         elevator_per_rate_error_s=0.0, roll_control_per_rate_error_s=0.0, rudder_per_rate_error_s=0.0
     )
-    demand = rate_demand(R, omega, bank, 0.0, record())
-    damped = rate_control(demand, R, omega, state(), record(), 0.02)
-    without = rate_control(demand, R, omega, state(), record(undamped), 0.02)
+    demand = rate_demand(R, omega, bank, 0.0, 1.0, CRUISE_M_S, record())
+    damped = rate_control(demand, R, omega, CRUISE_M_S, state(), record(), 0.02)
+    without = rate_control(demand, R, omega, CRUISE_M_S, state(), record(undamped), 0.02)
     np.testing.assert_allclose(damped, without, rtol=0, atol=ROUND_OFF)
 
 
 def test_rate_control_turn_of_a_flat_bank_would_leak_without_the_matrix():
     """The same turn rate with wings level is a yaw error: the rudder answers, the elevator does not."""
     level, omega = np.eye(3), np.array([0.0, 0.0, 0.5])
-    roll, pitch_control, yaw = control_of(rate_demand(level, omega, 0.0, 0.0, record()), level, omega)
+    roll, pitch_control, yaw = control_of(rate_demand(level, omega, 0.0, 0.0, 1.0, CRUISE_M_S, record()), level, omega)
     assert (roll, pitch_control) == (0.0, 0.0)
     assert yaw == pytest.approx(-0.5 * PARAMS.rudder_per_rate_error_s, rel=0, abs=ROUND_OFF)
 
@@ -160,7 +163,7 @@ def test_elevator_grows_with_bank_on_either_side():
         for side in (-1.0, 1.0):
             bank = side * math.radians(degrees)
             R = attitude(bank, 0.0)
-            demand = rate_demand(R, STILL, bank, 0.0, record())
+            demand = rate_demand(R, STILL, bank, 0.0, 1.0, CRUISE_M_S, record())
             both.append(control_of(demand, R, np.array(demand))[1])
         np.testing.assert_allclose(both[0], both[1], rtol=0, atol=ROUND_OFF)
         elevators.append(both[0])
@@ -170,19 +173,19 @@ def test_elevator_grows_with_bank_on_either_side():
 
 @compiled
 @given(bank=st.floats(-1.04, 1.04))
-def test_extra_load_level_turn_is_one_over_r_zz_minus_one(bank):
+def test_extra_lift_level_turn_is_one_over_r_zz_minus_one(bank):
     """V q / g + r_zz - 1 with the pitch rate of a level turn is the load factor less one, 1 / cos(bank) - 1."""
-    q = G_M_S2 * math.tan(bank) * math.sin(bank) / PARAMS.airspeed_m_s
-    load = extra_load(q, math.cos(bank), record())
+    q = G_M_S2 * math.tan(bank) * math.sin(bank) / CRUISE_M_S
+    load = extra_lift(q, math.cos(bank), CRUISE_M_S, record())
     np.testing.assert_allclose(load, 1.0 / math.cos(bank) - 1.0, rtol=0, atol=ROUND_OFF)
 
 
 @pytest.mark.parametrize(("r_zz", "less"), [(1.0, 0.0), (-1.0, 2.0)])
-def test_extra_load_loop_is_centripetal_with_or_against_the_weight(r_zz, less):
+def test_extra_lift_loop_is_centripetal_with_or_against_the_weight(r_zz, less):
     """At the bottom of a loop the lift carries the weight besides, at the top the weight helps to turn."""
     q = 1.5
-    expected = PARAMS.airspeed_m_s * q / G_M_S2 - less
-    np.testing.assert_allclose(extra_load(q, r_zz, record()), expected, rtol=0, atol=ROUND_OFF)
+    expected = CRUISE_M_S * q / G_M_S2 - less
+    np.testing.assert_allclose(extra_lift(q, r_zz, CRUISE_M_S, record()), expected, rtol=0, atol=ROUND_OFF)
 
 
 @compiled
@@ -200,10 +203,10 @@ def test_integral_at_the_stop_waits_and_otherwise_is_limited():
     """A surface at its stop must not wind up its integral; a lasting error never passes the limit."""
     s, p = state(), record()
     for _ in range(1000):
-        rate_control((10.0, 10.0, 0.0), np.eye(3), STILL, s, p, 0.02)
+        rate_control((10.0, 10.0, 0.0), np.eye(3), STILL, CRUISE_M_S, s, p, 0.02)
     assert (s["roll_integral"], s["pitch_integral"]) == (0.0, 0.0)
     for _ in range(1000):
-        rate_control((0.4, 0.2, 0.0), np.eye(3), STILL, s, p, 0.02)
+        rate_control((0.4, 0.2, 0.0), np.eye(3), STILL, CRUISE_M_S, s, p, 0.02)
     assert s["roll_integral"] == PARAMS.integral_limit
     assert s["pitch_integral"] == PARAMS.integral_limit
 
