@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.autopilot import DcmAutopilot
+from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
-from autopilot.guidance import GuidanceParams
 from autopilot.interface import Mode, Setpoint, Waypoint
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Health, Measurements
 
@@ -78,7 +78,7 @@ def test_gps_silent_circle_is_gentle_at_cruise_and_glide_is_without_motor():
     commands = aboard.fly(setpoint, 60.0, gps=False)
     circle, glide = (next(c for c in reversed(commands) if c.mode == mode) for mode in (Mode.CIRCLE, Mode.GLIDE))
     assert circle.bank_demand_rad == glide.bank_demand_rad == P.bank_rad
-    assert circle.throttle == GuidanceParams().throttle_trim
+    assert circle.throttle == EnergyParams().throttle_trim
     assert (glide.throttle, glide.pitch_demand_rad) == (0.0, P.glide_pitch_rad)
 
 
@@ -144,7 +144,7 @@ def test_radio_lost_turns_home_whatever_bank_the_pilot_allowed():
     aboard = Aboard()
     assert aboard.fly(asking(Mode.COURSE, bank_limit_rad=0.0), 1.0)[-1].bank_demand_rad == 0.0
     home = aboard.fly(asking(Mode.COURSE, bank_limit_rad=0.0, radio=False), 1.0)[-1]
-    assert abs(home.bank_demand_rad) == P.bank_rad
+    assert 0.8 * P.bank_rad < abs(home.bank_demand_rad) <= P.bank_rad
 
 
 def test_radio_lost_does_not_end_a_launch_but_follows_it():
@@ -241,7 +241,7 @@ def test_level_flies_on_the_last_healthy_attitude_and_the_raw_gyros():
     assert level.mode == Mode.LEVEL
     now = last * Rotation.from_rotvec(turning * 1.02)
     true = AttitudeEstimate(now.as_matrix(), turning)
-    trim = GuidanceParams().pitch_trim_rad
+    trim = EnergyParams().pitch_trim_rad
     (expected,) = told.fly(asking(Mode.STABILISE, pitch_rad=trim), DT_S, estimate=true)
     np.testing.assert_allclose(level[:3], expected[:3], rtol=0, atol=0.005)
     assert level.bank_demand_rad == 0.0
@@ -268,8 +268,8 @@ def test_low_banks_little_and_climbs_until_it_is_safe(mode):
         assert command.mode == expected
         if expected == Mode.LOW:
             assert abs(command.bank_demand_rad) <= P.low_bank_rad
-            assert command.pitch_demand_rad > GuidanceParams().pitch_trim_rad
-            assert command.throttle > GuidanceParams().throttle_trim
+            assert command.pitch_demand_rad > EnergyParams().pitch_trim_rad
+            assert command.throttle > EnergyParams().throttle_trim
 
 
 def test_low_climbs_although_less_height_was_asked_for():
@@ -277,7 +277,7 @@ def test_low_climbs_although_less_height_was_asked_for():
     aboard = Aboard()
     aboard.height_m = 12.0
     command = aboard.fly(asking(Mode.COURSE, height_m=10.0), 1.0)[-1]
-    assert command.pitch_demand_rad > GuidanceParams().pitch_trim_rad
+    assert command.pitch_demand_rad > EnergyParams().pitch_trim_rad
 
 
 @pytest.mark.parametrize("mode", [*OTHERS, Mode.LAUNCH])

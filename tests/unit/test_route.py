@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from autopilot.airframes import AutopilotParams
 from autopilot.autopilot import _ASKED, _PARAMS, _STATE, _write
+from autopilot.energy import EnergyParams
 from autopilot.guidance import GuidanceParams, gps_age, unseen_turn
 from autopilot.interface import Mode, Setpoint, Waypoint
 from autopilot.route import (
@@ -28,7 +29,7 @@ from autopilot.route import (
 )
 from estimator.interface import MEASURED_DTYPE
 
-G, V, DT_S, LATENCY_S = 9.80665, GuidanceParams().airspeed_m_s, 0.02, 0.3
+G, V, DT_S, LATENCY_S = 9.80665, EnergyParams().airspeed_m_s, 0.02, 0.3
 LIMIT_RAD = math.radians(35.0)
 SQUARE = (Waypoint(250, 0, 60), Waypoint(250, 250, 60), Waypoint(0, 250, 60), Waypoint(0, 0, 60))
 compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
@@ -41,7 +42,9 @@ def records(route=None):
     params, whole = np.zeros(1, _PARAMS)[0], AutopilotParams(route=route or RouteParams())
     for name in ("route", "guidance"):
         params[name] = astuple(getattr(whole, name))
-    return params["route"], params["guidance"], np.zeros(1, _STATE)[0]
+    state = np.zeros(1, _STATE)[0]
+    state["airspeed_m_s"] = V
+    return params["route"], params["guidance"], state
 
 
 def asked_of(setpoint):
