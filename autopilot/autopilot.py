@@ -85,6 +85,7 @@ _STATE = np.dtype(
         ("R_kept_eb", "f8", (3, 3)),  # attitude of the last healthy estimate, carried on with
         ("bias_kept_b_rad_s", "f8", (3,)),  # its offset of the gyros
         ("omega_kept_b_rad_s", "f8", (3,)),
+        ("height_kept_m", "f8"),  # of the beginning of LEVEL
     ],
     align=True,
 )
@@ -107,11 +108,12 @@ def ask(mode, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def enter(mode, led_by, s):  # type: ignore[no-untyped-def]
+def enter(mode, led_by, height_m, s):  # type: ignore[no-untyped-def]
     """Change to `mode`, led by `led_by`: forget what belongs to the one that is left, keep the trim that was learnt."""
     if mode != s.mode:
         if RATE in (mode, s.mode):
             s.roll_integral = s.pitch_integral = 0.0
+        s.height_kept_m = height_m
         s.mode = mode
     if led_by != s.led_by:
         s.outbound = s.on_leg = 0
@@ -152,7 +154,9 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
             asked.north_m, asked.east_m, asked.radius_m, asked.left, me.p.route, p,
         )  # fmt: skip
     elif s.led_by == WAYPOINTS:
-        bank, wanted_m = bank_along_route(north, east, r_zy, row, height_m, asked, s, limit_rad, me.p.route, p)
+        bank, wanted_m = bank_along_route(
+            north, east, r_zy, wind_e_m_s, row, height_m, asked, s, limit_rad, me.p.route, p
+        )
     else:
         sine, cosine = heading_error(north, east, math.cos(asked.course_rad), math.sin(asked.course_rad))
         bank = bank_for_heading(sine, cosine, r_zy, limit_rad, p)
@@ -225,7 +229,7 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     height_m = height(row, p.guidance)
     mode, led_by = mode_in_force(asked, height_m, s, p.failsafe, dt_s)
     if mode != s.mode or led_by != s.led_by:
-        enter(mode, led_by, s)
+        enter(mode, led_by, height_m, s)
     s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
     reckon_speed(wind_e_m_s, row, me, dt_s)
     if mode == MANUAL:

@@ -6,10 +6,10 @@ Each tick, the first line that applies:
 In force            When                                        What is flown
 ==================  ==========================================  ================================================
 MANUAL, RATE        asked for, and the radio is heard           what the pilot says: nothing below takes it away
-LEVEL               the estimator was healthy once, and calls   wings level at cruise, on the attitude when it was
-                    itself POOR for `unhealthy_s` though the    last healthy, carried on with the raw gyros less
-                    GPS is alive and fresh; until it is GOOD    the offset believed then (Eqn 17)
-                    as long
+LEVEL               the estimator was healthy once, and calls   wings level at the height where it began, on the
+                    itself POOR for `unhealthy_s` though the    attitude when it was last healthy, carried on with
+                    GPS is alive and fresh; until it is GOOD    the raw gyros less the offset believed then (Eqn
+                    as long                                     17); no height, the pitch of cruise
 LAUNCH              asked for, and not over yet, radio or not   as asked
 STABILISE           asked for, and the radio is heard           as asked
 GLIDE               as CIRCLE, for more than `circle_s`         the same circle, motor off, at the pitch of a glide
@@ -48,7 +48,8 @@ class FailsafeParams:
     """When a failsafe takes over, and how it flies; the defaults fly the aeroplane `endurance`.
 
     gps_lost_s : silence after which the GPS counts as lost; longer than the pause between fixes of a slow receiver
-    gps_back_s : time for which fixes must have come again
+    gps_back_s : time for which fixes must have come again, with pauses of half that silence at most; longer than such
+        a pause, so that one fix alone is not taken for a GPS
     circle_s : of the circle at cruise, before the motor is switched off
     bank_rad : of the circle         glide_pitch_rad : of the glide, motor off
     unhealthy_s : an estimator that is POOR for so long is not believed, one that is GOOD for so long is again
@@ -57,10 +58,10 @@ class FailsafeParams:
     """
 
     gps_lost_s: float = 3.0
-    gps_back_s: float = 1.0
+    gps_back_s: float = 2.0
     circle_s: float = 30.0
-    bank_rad: float = math.radians(15.0)
-    glide_pitch_rad: float = math.radians(-3.0)
+    bank_rad: float = math.radians(10.0)
+    glide_pitch_rad: float = math.radians(-4.0)
     unhealthy_s: float = 5.0
     low_height_m: float = 20.0
     safe_height_m: float = 30.0
@@ -78,8 +79,10 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
     for i in range(3):  # a fix of no numbers is none
         arrived = arrived and math.isfinite(row.gps_p_e_m[i]) and math.isfinite(row.gps_v_e_m_s[i])
     s.silent_s = 0.0 if arrived or row.gps_valid == 0 else s.silent_s + dt_s
-    s.heard_s = 0.0 if s.silent_s > p.gps_lost_s else s.heard_s + dt_s
-    if s.heard_s >= p.gps_back_s:
+    heard = s.heard_s >= p.gps_back_s
+    patience_s = p.gps_lost_s if heard else 0.5 * p.gps_lost_s
+    s.heard_s = 0.0 if s.silent_s > patience_s else s.heard_s + dt_s
+    if heard:
         s.circled_s = 0.0
 
 
@@ -151,17 +154,18 @@ def mode_in_force(asked, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
         s.low = 1
     elif not height_m < p.safe_height_m:  # also where nobody knows
         s.low = 0
-    return (LOW if s.low or asked.mode == LOW else mode), mode
+    return (LOW if s.low or (asked.mode == LOW and asked.radio) else mode), mode
 
 
 @kernel
 def circle(mode, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE and LEVEL: no position, no height.
+    """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE and LEVEL, which go nowhere.
 
-    s : record of the height loop   p : record of AutopilotParams
+    s : record of the height loop, and the height kept   p : record of AutopilotParams
     """
     bank_rad = 0.0 if mode == LEVEL else min(p.failsafe.bank_rad, p.guidance.bank_limit_rad)
     if mode == GLIDE:
         return bank_rad, p.failsafe.glide_pitch_rad, 0.0
-    pitch_rad, throttle = hold_height(math.nan, row, s, p, dt_s)  # no height asked for: level flight at cruise
+    # The climb that the GPS shows holds the pitch that gyros alone would lose; without a height, level flight.
+    pitch_rad, throttle = hold_height(s.height_kept_m if mode == LEVEL else math.nan, row, s, p, dt_s)
     return bank_rad, pitch_rad, throttle

@@ -14,7 +14,8 @@ Where the path is further away than ``L1`` the reference point is so as well, an
 met along its tangent, a line at 45 degrees.
 
 A leg is left for the next one early enough for an arc between the two: r tan(angle / 2) before the corner, r the
-radius of the turn at the speed over the ground and the bank allowed, and the way flown while rolling into it.
+radius of the turn at the speed over the ground and the bank allowed, and the way flown while rolling into it.  The
+speed is that of now or, where the wind is known, the mean of this one and that of the next leg.
 
 Source: S. Park, J. Deyst, J. P. How, A New Nonlinear Guidance Logic for Trajectory Tracking, AIAA 2004-4900.
 """
@@ -139,6 +140,16 @@ def bank_to_circle(north, east, r_zy, row, s, limit_rad, centre_north_m, centre_
 
 
 @kernel
+def speed_along(north, east, wind_e_m_s, airspeed_m_s):  # type: ignore[no-untyped-def]
+    """Speed over the ground in a direction (north, east), m/s, by the wind triangle; NaN where no wind is known."""
+    along_m_s = wind_e_m_s[0] * north + wind_e_m_s[1] * east
+    across_m_s = wind_e_m_s[1] * north - wind_e_m_s[0] * east
+    if not abs(across_m_s) < airspeed_m_s:
+        return math.nan
+    return along_m_s + math.sqrt(airspeed_m_s * airspeed_m_s - across_m_s * across_m_s)
+
+
+@kernel
 def begin_of_turn(speed_m_s, sine, cosine, limit_rad, p):  # type: ignore[no-untyped-def]
     """Distance before a corner at which the turn to the next leg begins, m: roll, and r tan(angle / 2).
 
@@ -181,10 +192,10 @@ def height_on_leg(length_m, left_m, asked, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bank_along_route(north, east, r_zy, row, height_m, asked, s, limit_rad, p, g):  # type: ignore[no-untyped-def]
+def bank_along_route(north, east, r_zy, wind_e_m_s, row, height_m, asked, s, limit_rad, p, g):  # type: ignore[no-untyped-def]
     """Bank demand, rad, and height wanted, m, on the way along the route; one waypoint alone is circled.
 
-    north, east : direction of travel   height_m : of now   asked : record of the set-point
+    north, east : direction of travel   wind_e_m_s : shape (3,) or NaN   height_m : of now   asked : the set-point
     s : record with the progress along the route, updated   p, g : records of RouteParams, GuidanceParams
     """
     if asked.n_waypoints == 1:
@@ -199,7 +210,9 @@ def bank_along_route(north, east, r_zy, row, height_m, asked, s, limit_rad, p, g
     to, then = asked.route[s.next_waypoint], asked.route[(s.next_waypoint + 1) % asked.n_waypoints]
     then_north, then_east = unit(then[0] - to[0], then[1] - to[1])
     sine, cosine = heading_error(along_north, along_east, then_north, then_east)
-    if left_m < begin_of_turn(speed_m_s, sine, cosine, limit_rad, p):
+    then_m_s = speed_along(then_north, then_east, wind_e_m_s, s.airspeed_wanted_m_s)
+    mean_m_s = 0.5 * (speed_m_s + max(then_m_s, p.slowest_m_s)) if math.isfinite(then_m_s) else speed_m_s
+    if left_m < begin_of_turn(mean_m_s, sine, cosine, limit_rad, p):
         s.leg_from_m[0], s.leg_from_m[1], s.leg_from_m[2] = to[0], to[1], to[2]
         s.next_waypoint = (s.next_waypoint + 1) % asked.n_waypoints
         along_north, along_east, length_m, left_m, right_of_it_m = leg_flown(north_m, east_m, height_m, asked, s)

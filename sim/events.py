@@ -6,16 +6,28 @@ from typing import Literal
 import numpy as np
 
 from autopilot.interface import Mode
+from autopilot.pilot import Script
 from estimator.interface import Health
 from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.sensors.faults import Fault
 
 _GPS_SILENCE_S = 2.5  # without a fix for longer, the GPS counts as lost
 _PHASES = {Phase.HELD: "held in the hand", Phase.THROWN: "thrown", Phase.FLYING: "released"}
+_FAILSAFES = {
+    Mode.CIRCLE: "no GPS",
+    Mode.GLIDE: "no GPS for long",
+    Mode.LEVEL: "estimator unhealthy",
+    Mode.LOW: "too near the ground",
+}
 
 
-def events_of(log: Log, outcome: Outcome, message: str) -> tuple[Event, ...]:
-    """Events of `log` in order of time; the last one says how the flight ended where that was not as planned."""
+def events_of(
+    log: Log, outcome: Outcome, message: str, script: Script | None = None, release_s: float = 0.0
+) -> tuple[Event, ...]:
+    """Events of `log` in order of time; the last one says how the flight ended where that was not as planned.
+
+    script, release_s : what was asked for, by time since the release; a mode that nobody asked for says why
+    """
     if len(log) == 0:
         return (Event(0.0, message or outcome, "error"),) if outcome != Outcome.COMPLETED else ()
     t_s = log.truth["t_s"]
@@ -27,8 +39,9 @@ def events_of(log: Log, outcome: Outcome, message: str) -> tuple[Event, ...]:
     if log.truth["phase"][0] != Phase.FLYING:
         events += [Event(float(t_s[k]), _PHASES[Phase(log.truth["phase"][k])]) for k in changes(log.truth["phase"])]
     events += [
-        Event(float(t_s[k]), f"mode {Mode(log.flown['mode'][k]).name.lower()}") for k in changes(log.flown["mode"])
+        _mode_event(Mode(log.flown["mode"][k]), float(t_s[k]), script, release_s) for k in changes(log.flown["mode"])
     ]
+    events += _radio_events(script, release_s, float(t_s[-1]))
     events += [
         Event(float(t_s[k]), f"estimator {Health(log.flown['health'][k]).name.lower()}")
         for k in changes(log.flown["health"])
@@ -45,6 +58,27 @@ def events_of(log: Log, outcome: Outcome, message: str) -> tuple[Event, ...]:
         level: Literal["warn", "error"] = "warn" if outcome == Outcome.INTERRUPTED else "error"
         events.append(Event(float(t_s[-1]), message or outcome.replace("_", " "), level))
     return tuple(sorted(events, key=lambda e: e.t_s))
+
+
+def _mode_event(mode: Mode, t_s: float, script: Script | None, release_s: float) -> Event:
+    """The mode that came into force at `t_s`; a warning, with the reason, where that is a failsafe."""
+    asked = script.at(t_s - release_s) if script is not None else None
+    text, reason = f"mode {mode.name.lower()}", _FAILSAFES.get(mode, "")
+    if asked is not None and asked.mode == mode:
+        reason = ""
+    elif asked is not None and not asked.radio and mode == Mode.RETURN:
+        reason = "no radio"
+    return Event(t_s, f"{text}: {reason}", "warn") if reason else Event(t_s, text)
+
+
+def _radio_events(script: Script | None, release_s: float, last_s: float) -> list[Event]:
+    """Where the pilot stops being heard, and is heard again."""
+    events, heard = [], True
+    for t_s, setpoint in script or ():
+        if setpoint.radio != heard:
+            heard = setpoint.radio
+            events.append(Event(release_s + t_s, "radio back" if heard else "radio lost", "info" if heard else "warn"))
+    return [event for event in events if event.t_s <= last_s]
 
 
 def events_of_faults(faults: Sequence[Fault], flight: Flight) -> tuple[Event, ...]:

@@ -81,7 +81,7 @@ def fly(
     except KeyboardInterrupt:
         outcome, message = Outcome.INTERRUPTED, f"interrupted {k * plant.dt_s:.1f} s after power-up"
     flown = log.until(k)
-    events = events_of(flown, outcome, message)
+    events = events_of(flown, outcome, message, script, plant.release_s)
     reference: HeadingReference = getattr(estimator, "heading_reference", "course")
     return Flight(flown, plant.dt_s, plant.release_s, outcome, reference, message, events, manifest or {})
 

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot.interface import Mode
 from estimator.interface import Array, HeadingReference
 from estimator.kernels import wrap
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad, rotation_error_rad
@@ -312,6 +313,11 @@ def pass_time_s(radius_m: float) -> Metric:
         return Measured(float(distance.t_s[near[0]]) if len(near) else math.nan)
 
     return metric
+
+
+def time_in_mode_s(mode: Mode) -> Metric:
+    """Metric: for how long `mode` was in force after the release, by the autopilot's own word, s."""
+    return lambda flight: Measured(flight.dt_s * int(np.sum((flight.log.flown["mode"] == mode) & (time_s(flight) > 0))))
 
 
 def summary(flight: Flight) -> dict[str, Any]:

@@ -5,6 +5,7 @@ paper taken out; and the check that must notice.  The unbroken estimator passes 
 For `gps_latency`, whose point is a failure, it is the cure that must fail.
 """
 
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -21,6 +22,9 @@ WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
+_BROKEN = Path(__file__).with_name("broken_autopilots.py")
+TURNS_AT_THE_CORNER = {"autopilot": f"{_BROKEN}:TurnsAtTheCorner"}
+NEVER_MISSES_THE_GPS = {"autopilot": f"{_BROKEN}:NeverMissesTheGps"}
 
 
 class Mutation(NamedTuple):
@@ -44,7 +48,8 @@ MUTATIONS = (
     Mutation("gentle_lady_return", "gyro_only", {}, "inclination error RMS"),
     Mutation("gps_latency", "premerlani", TOLD_THE_LATENCY, "heading error RMS, to be large"),
     Mutation("gps_outage", "gyro_only", {}, "survived"),
-    Mutation("gps_outage", "premerlani", NO_OFFSET, "inclination error RMS without fixes"),
+    Mutation("gps_outage", "premerlani", NEVER_MISSES_THE_GPS, "circled"),
+    Mutation("gps_outage", "premerlani", NO_OFFSET, "inclination error RMS afterwards"),
     Mutation("gyro_gain", "gyro_only", {}, "heading error RMS"),
     Mutation("gyro_gain", "premerlani", NO_OFFSET, "mean error of the corrected yaw rate"),
     Mutation("gyro_offset", "premerlani", NO_OFFSET, "offset not learnt"),
@@ -53,6 +58,8 @@ MUTATIONS = (
     Mutation("hand_launch", "accelerometer_only", {}, "survived"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
+    Mutation("turbulence_mission", "premerlani", NO_YAW, "waypoints reached"),
+    Mutation("turbulence_mission", "premerlani", TURNS_AT_THE_CORNER, "off the legs RMS"),
     Mutation("turns_180", "accelerometer_only", {}, "survived"),
     Mutation("turns_180", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
 )

@@ -1,8 +1,11 @@
 """Events read from a log."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from autopilot.interface import Mode
+from autopilot.interface import Mode, Setpoint
+from autopilot.pilot import Script
 from sim.events import events_of
 from sim.log import Log, Outcome, Phase
 
@@ -38,3 +41,29 @@ def test_events_of_a_failed_flight_end_with_the_fault():
 
 def test_events_of_an_empty_log_still_tell_the_end():
     assert events_of(Log.empty(0), Outcome.DIVERGED, "blew up")[0].text == "blew up"
+
+
+def test_events_of_failsafes_are_warnings_that_say_why():
+    """Modes that nobody asked for, and the radio: by the script."""
+    log = log_of(10)
+    order = (Mode.COURSE, Mode.CIRCLE, Mode.GLIDE, Mode.LEVEL, Mode.LOW, Mode.COURSE, Mode.RETURN, Mode.COURSE)
+    for i, mode in enumerate(order):
+        log.flown["mode"][50 * i :] = mode
+    course = Setpoint(Mode.COURSE)
+    script = Script([(0.0, course), (6.02, replace(course, radio=False)), (7.02, course)])
+    told = [e for e in events_of(log, Outcome.COMPLETED, "", script, 0.0) if not e.text.startswith("estimator")]
+    warnings = [e.text for e in told if e.level == "warn"]
+    assert sorted(warnings[:4]) == sorted(
+        ["mode circle: no GPS", "mode glide: no GPS for long", "mode level: estimator unhealthy",
+         "mode low: too near the ground"]
+    )  # fmt: skip
+    assert sorted(warnings[4:]) == ["mode return: no radio", "radio lost"]
+    assert [e.text for e in told if e.level == "info"] == ["mode course", "mode course", "radio back", "mode course"]
+
+
+def test_events_of_modes_that_were_asked_for_are_no_warnings():
+    """A script may ask for a circle, and for the way home."""
+    log = log_of(4)
+    log.flown["mode"][:100], log.flown["mode"][100:] = Mode.CIRCLE, Mode.RETURN
+    script = Script([(0.0, Setpoint(Mode.CIRCLE)), (2.0, Setpoint(Mode.RETURN))])
+    assert {e.level for e in events_of(log, Outcome.COMPLETED, "", script, 0.0)} == {"info"}

@@ -1,0 +1,74 @@
+"""How a route of waypoints was flown, read from the truth alone: what was reached, and how far off the legs.
+
+A waypoint is reached where the aeroplane, having reached those before it, first comes within so many metres of it,
+over the ground.  Off the legs is off the nearer of two: the one that leads to the waypoint due, and the one before
+it, whose corner is still being rounded.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot.interface import Waypoint
+from estimator.interface import Array
+from scenarios.harness.metrics import Measured, Metric, Series, SeriesOf, time_s
+from sim.log import Flight, Phase
+
+REACHED_M = 30.0
+
+
+def reached(p_e_m: Array, route: Sequence[Waypoint], near_m: float = REACHED_M) -> NDArray[np.int64]:
+    """How many waypoints, counted on round after round, had been reached at each tick, shape (n,)."""
+    counts, k = np.zeros(len(p_e_m), np.int64), 0
+    distances = [np.hypot(p_e_m[:, 0] - w.north_m, p_e_m[:, 1] - w.east_m) for w in route]
+    while True:
+        due = int(counts[-1]) if len(counts) else 0
+        near = np.flatnonzero(distances[due % len(route)][k:] <= near_m)
+        if not len(near):
+            return counts
+        k += int(near[0])
+        counts[k:] = due + 1
+
+
+def _off_leg(p_e_m: Array, begin: Array, end: Array) -> tuple[Array, Array]:
+    """Distance to a leg over the ground, and height missing to the straight line along it; each of shape (n,)."""
+    way = end[:, :2] - begin[:, :2]
+    length = np.maximum(np.sum(way**2, axis=1), 1e-9)
+    share = np.clip(np.sum((p_e_m[:, :2] - begin[:, :2]) * way, axis=1) / length, 0.0, 1.0)
+    at = begin + share[:, None] * (end - begin)
+    return np.hypot(*(p_e_m[:, :2] - at[:, :2]).T), at[:, 2] + p_e_m[:, 2]
+
+
+def _off_route(flight: Flight, route: Sequence[Waypoint]) -> tuple[Array, Array]:
+    """Cross-track distance and height missing, m, by the nearer leg, shape (n,)."""
+    p_e_m, points = flight.log.truth["p_e_m"], np.array(route, np.float64)
+    due = reached(p_e_m, route)
+    ends = [points[(due + i) % len(route)] for i in (-2, -1, 0)]
+    (before, low), (now, high) = (_off_leg(p_e_m, ends[i], ends[i + 1]) for i in (0, 1))
+    return np.minimum(before, now), np.where(before < now, low, high)
+
+
+def off_route_m(route: Sequence[Waypoint]) -> SeriesOf:
+    """Distance over the ground from the legs of `route`, m."""
+    return lambda flight: _judged(flight, _off_route(flight, route)[0])
+
+
+def height_missing_m(route: Sequence[Waypoint]) -> SeriesOf:
+    """Height above the aeroplane of the straight line from waypoint to waypoint, m."""
+    return lambda flight: _judged(flight, _off_route(flight, route)[1])
+
+
+def waypoints_reached(route: Sequence[Waypoint], near_m: float = REACHED_M) -> Metric:
+    """Metric: how many waypoints were reached in their order."""
+
+    def metric(flight: Flight) -> Measured:
+        counts = reached(flight.log.truth["p_e_m"], route, near_m)
+        return Measured(float(counts[-1]) if len(counts) else math.nan)
+
+    return metric
+
+
+def _judged(flight: Flight, value: Array) -> Series:
+    return Series(time_s(flight), value, flight.log.truth["phase"] == Phase.FLYING)

@@ -1,0 +1,332 @@
+"""The mode in force: each failsafe taken, held and handed back, one tick at a time."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from autopilot.autopilot import DcmAutopilot
+from autopilot.energy import EnergyParams
+from autopilot.failsafe import FailsafeParams
+from autopilot.interface import Mode, Setpoint, Waypoint
+from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Health, Measurements
+
+P, DT_S = FailsafeParams(), 0.02
+ROUTE = (Waypoint(300, 0, 60), Waypoint(300, 300, 60), Waypoint(0, 300, 60))
+BY_POSITION = (Mode.COURSE, Mode.RETURN, Mode.LOITER, Mode.WAYPOINTS)
+OTHERS = (Mode.MANUAL, Mode.RATE, Mode.STABILISE)
+
+
+def asking(mode, **others):
+    return Setpoint(mode, route=ROUTE, **others)
+
+
+class Aboard:
+    """An autopilot and the measurements it is shown, tick after tick."""
+
+    def __init__(self, aircraft="endurance"):
+        self.autopilot, self.row = DcmAutopilot(aircraft=aircraft), np.zeros(1, MEASURED_DTYPE)
+        self.row["dt_s"], self.row["force_b_m_s2"] = DT_S, (0.0, 0.0, -9.8)
+        self.ticks, self.height_m, self.latency_s, self.numbers = 0, 60.0, 0.3, True
+
+    def fly(self, setpoint, seconds, *, gps=True, estimate=None):
+        """Commands of so many seconds; a fix every 0.2 s where there is a GPS."""
+        commands = []
+        for _ in range(round(seconds / DT_S)):
+            self.row["t_s"] = self.ticks * DT_S
+            self.row["gps_new"] = gps and self.ticks % 10 == 0
+            if self.row["gps_new"][0]:
+                self.row["gps_valid"], self.row["gps_t_s"] = 1, self.row["t_s"] - self.latency_s
+                self.row["gps_p_e_m"] = (200.0, 0.0, -self.height_m) if self.numbers else math.nan
+                self.row["gps_v_e_m_s"] = (12.0, 0.0, 0.0)
+            measured = Measurements(self.row.copy(), 0)
+            commands.append(self.autopilot.update(estimate or AttitudeEstimate(np.eye(3)), measured, setpoint))
+            self.ticks += 1
+        return commands
+
+    def modes(self, *args, **others):
+        """The modes in force, each with how long it was, s."""
+        found = []
+        for command in self.fly(*args, **others):
+            if found and found[-1][0] == command.mode:
+                found[-1][1] += DT_S
+            else:
+                found.append([command.mode, DT_S])
+        return [(Mode(mode), round(time_s, 6)) for mode, time_s in found]
+
+
+@pytest.mark.parametrize("mode", BY_POSITION)
+def test_gps_silent_circles_then_glides_and_hands_back_what_was_asked_for(mode):
+    """Circle after 3 s of silence, glide 30 s later, and back 2 s after the first fix."""
+    aboard = Aboard()
+    assert aboard.modes(asking(mode), 10.0) == [(mode, 10.0)]
+    silent = aboard.modes(asking(mode), 60.0, gps=False)
+    assert [m for m, _ in silent] == [mode, Mode.CIRCLE, Mode.GLIDE]
+    times = [t for _, t in silent]
+    np.testing.assert_allclose(times[0], P.gps_lost_s, rtol=0, atol=0.21)  # since the last fix, not the last tick
+    np.testing.assert_allclose(times[1], P.circle_s, rtol=0, atol=2 * DT_S)
+    back = aboard.modes(asking(mode), 10.0)
+    assert [m for m, _ in back] == [Mode.GLIDE, mode]
+    np.testing.assert_allclose(back[0][1], P.gps_back_s, rtol=0, atol=0.21)
+
+
+def test_gps_silent_circle_is_gentle_at_cruise_and_glide_is_without_motor():
+    """Both with the same bank; the pilot's throttle is not obeyed by a failsafe."""
+    aboard, setpoint = Aboard(), asking(Mode.COURSE, throttle=1.0)
+    aboard.fly(setpoint, 2.0)
+    commands = aboard.fly(setpoint, 60.0, gps=False)
+    circle, glide = (next(c for c in reversed(commands) if c.mode == mode) for mode in (Mode.CIRCLE, Mode.GLIDE))
+    assert circle.bank_demand_rad == glide.bank_demand_rad == P.bank_rad
+    assert circle.throttle == EnergyParams().throttle_trim
+    assert (glide.throttle, glide.pitch_demand_rad) == (0.0, P.glide_pitch_rad)
+
+
+@pytest.mark.parametrize("mode", OTHERS)
+def test_gps_silent_is_nothing_to_modes_that_need_no_position(mode):
+    """Sticks and attitudes are flown on."""
+    aboard = Aboard()
+    aboard.fly(asking(mode), 1.0)
+    assert aboard.modes(asking(mode), 50.0, gps=False) == [(mode, 50.0)]
+
+
+def test_gps_late_but_alive_is_not_lost():
+    """Fixes that arrive, each 12 s old: not to be believed, but nothing is silent."""
+    aboard = Aboard()
+    aboard.latency_s = 12.0
+    assert aboard.modes(asking(Mode.COURSE), 60.0) == [(Mode.COURSE, 60.0)]
+
+
+def test_gps_that_reports_no_numbers_is_lost():
+    """A fix of no numbers is none."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 5.0)
+    aboard.numbers = False
+    assert aboard.modes(asking(Mode.COURSE), 10.0)[-1][0] == Mode.CIRCLE
+
+
+def test_gps_never_heard_is_not_lost():
+    """An aeroplane without a receiver, or one that waits for the first fix, flies as it was told to."""
+    assert Aboard().modes(asking(Mode.COURSE), 60.0, gps=False) == [(Mode.COURSE, 60.0)]
+
+
+def test_gps_that_flickers_goes_on_circling():
+    """One fix in four seconds is never heard for long enough, and the time of the circle goes on."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 2.0)
+    modes = []
+    for _ in range(12):
+        modes += [c.mode for c in aboard.fly(asking(Mode.COURSE), 3.8, gps=False)]
+        modes += [c.mode for c in aboard.fly(asking(Mode.COURSE), 0.2)]
+    assert list(dict.fromkeys(modes)) == [Mode.COURSE, Mode.CIRCLE, Mode.GLIDE]
+    assert np.count_nonzero(np.diff(modes)) == 2
+
+
+@pytest.mark.parametrize("mode", [m for m in Mode if m not in (Mode.LAUNCH, Mode.RETURN)])
+def test_radio_lost_returns_at_once_and_obeys_when_it_is_heard_again(mode):
+    """In any mode; also where the pilot had the sticks."""
+    aboard = Aboard()
+    before = aboard.modes(asking(mode), 5.0)
+    assert aboard.modes(asking(mode, radio=False), 5.0) == [(Mode.RETURN, 5.0)]
+    assert aboard.modes(asking(mode), 5.0) == before
+
+
+def test_radio_lost_and_gps_lost_circles():
+    """There is no way home without a position."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.MANUAL), 2.0)
+    modes = aboard.modes(asking(Mode.MANUAL, radio=False), 50.0, gps=False)
+    assert [m for m, _ in modes] == [Mode.RETURN, Mode.CIRCLE, Mode.GLIDE]
+
+
+def test_radio_lost_turns_home_whatever_bank_the_pilot_allowed():
+    """A bank limit of zero is no way home."""
+    aboard = Aboard()
+    assert aboard.fly(asking(Mode.COURSE, bank_limit_rad=0.0), 1.0)[-1].bank_demand_rad == 0.0
+    home = aboard.fly(asking(Mode.COURSE, bank_limit_rad=0.0, radio=False), 1.0)[-1]
+    assert abs(home.bank_demand_rad) == P.bank_rad
+
+
+def test_radio_lost_does_not_end_a_launch_but_follows_it():
+    """In the hand and in the climb the launch goes on; at its height the aeroplane comes home, motor on."""
+    aboard, launch = Aboard(), asking(Mode.LAUNCH, radio=False)
+    aboard.height_m = 1.7
+    assert aboard.fly(launch, 2.0)[-1][3:5] == (0.0, Mode.LAUNCH)
+    aboard.row["force_b_m_s2"] = (27.0, 0.0, -9.8)
+    aboard.fly(launch, 0.3)
+    aboard.row["force_b_m_s2"] = (0.0, 0.0, -9.8)
+    assert aboard.fly(launch, 3.0)[-1].mode == Mode.LAUNCH
+    aboard.height_m = 49.0
+    commands = aboard.fly(launch, 3.0)
+    assert commands[-1].mode == Mode.RETURN
+    assert all(c.throttle > 0.0 for c in commands)
+    heard = aboard.fly(asking(Mode.LAUNCH), 1.0)[-1]  # not back into the hand: its throw was felt
+    assert heard.mode == Mode.LAUNCH
+    assert heard.throttle > 0.0
+
+
+def poor(R_eb=None, health=Health.POOR):
+    return AttitudeEstimate(np.eye(3) if R_eb is None else R_eb, health=health)
+
+
+@pytest.mark.parametrize("mode", [*BY_POSITION, Mode.STABILISE])
+def test_estimator_poor_with_gps_alive_flies_level_until_it_is_good_as_long(mode):
+    """POOR for 5 s, then level; GOOD for 5 s, then again what was asked for."""
+    aboard = Aboard()
+    aboard.fly(asking(mode), 5.0)
+    modes = aboard.modes(asking(mode), 20.0, estimate=poor())
+    assert [m for m, _ in modes] == [mode, Mode.LEVEL]
+    np.testing.assert_allclose(modes[0][1], P.unhealthy_s, rtol=0, atol=2 * DT_S)
+    back = aboard.modes(asking(mode), 20.0)
+    assert [m for m, _ in back] == [Mode.LEVEL, mode]
+    np.testing.assert_allclose(back[0][1], P.unhealthy_s, rtol=0, atol=2 * DT_S)
+
+
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.RATE])
+def test_estimator_poor_leaves_the_pilot_his_sticks(mode):
+    """Manual and rate are never taken away, but by a radio that falls silent."""
+    aboard = Aboard()
+    aboard.fly(asking(mode), 1.0)
+    assert aboard.modes(asking(mode), 20.0, estimate=poor()) == [(mode, 20.0)]
+    assert aboard.fly(asking(mode, radio=False), 1.0, estimate=poor())[-1].mode == Mode.LEVEL
+
+
+def test_estimator_poor_for_want_of_fixes_is_left_to_the_gps_failsafe():
+    """Shipped estimators call themselves POOR 2 s after the last fix: that is no reason for LEVEL."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 5.0)
+    aboard.fly(asking(Mode.COURSE), 2.0, gps=False)
+    modes = aboard.modes(asking(Mode.COURSE), 60.0, gps=False, estimate=poor())
+    assert [m for m, _ in modes] == [Mode.COURSE, Mode.CIRCLE, Mode.GLIDE]
+    aboard.latency_s = 12.0
+    aboard.fly(asking(Mode.COURSE), 2.0)
+    assert aboard.modes(asking(Mode.COURSE), 20.0, estimate=poor()) == [(Mode.COURSE, 20.0)]
+
+
+def test_estimator_that_rejects_a_sample_now_and_then_is_believed():
+    """POOR in every third tick is no lasting illness."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 1.0)
+    for _ in range(500):
+        command = [*aboard.fly(asking(Mode.COURSE), 0.04), *aboard.fly(asking(Mode.COURSE), 0.02, estimate=poor())]
+    assert {c.mode for c in command} == {Mode.COURSE}
+
+
+@pytest.mark.parametrize("health", [Health.STARTING, Health.POOR])
+def test_estimator_that_never_was_healthy_leaves_no_attitude_to_fall_back_on(health):
+    """What it says is all there is."""
+    aboard = Aboard()
+    assert aboard.modes(asking(Mode.COURSE), 30.0, estimate=poor(health=health)) == [(Mode.COURSE, 30.0)]
+
+
+def test_level_flies_on_the_last_healthy_attitude_and_the_raw_gyros():
+    """Against SciPy: 20 degrees of bank when last healthy, 30 deg/s for a second since, the offset taken off.
+
+    Roll control is then that of an attitude which the broken estimate does not know: it must be the same as that of
+    an autopilot told the true attitude; equal to 0.5 % of full deflection, for Eqn 17's steps of first order.
+    """
+    offset, turning = np.radians([3.0, -2.0, 1.0]), np.radians([30.0, 0.0, 0.0])
+    aboard, told = Aboard(), Aboard()
+    last = Rotation.from_euler("ZYX", [1.0, 0.05, math.radians(20.0)])
+    healthy = AttitudeEstimate(last.as_matrix(), np.zeros(3), offset)
+    aboard.row["gyro_b_rad_s"] = offset
+    aboard.fly(asking(Mode.STABILISE), 1.0, estimate=healthy)
+    garbage = poor(Rotation.from_euler("ZYX", [2.0, 1.0, -2.5]).as_matrix())
+    aboard.fly(asking(Mode.STABILISE), P.unhealthy_s + 0.1, estimate=garbage)
+    aboard.row["gyro_b_rad_s"] = offset + turning
+    aboard.fly(asking(Mode.STABILISE), 1.0, estimate=garbage)
+    aboard.autopilot._memory["s"]["roll_integral"] = 0.0
+    aboard.autopilot._memory["s"]["pitch_integral"] = 0.0
+    (level,) = aboard.fly(asking(Mode.STABILISE), DT_S, estimate=garbage)
+    assert level.mode == Mode.LEVEL
+    now = last * Rotation.from_rotvec(turning * 1.02)
+    true = AttitudeEstimate(now.as_matrix(), turning)
+    trim = EnergyParams().pitch_trim_rad
+    (expected,) = told.fly(asking(Mode.STABILISE, pitch_rad=trim), DT_S, estimate=true)
+    np.testing.assert_allclose(level[:3], expected[:3], rtol=0, atol=0.005)
+    assert level.bank_demand_rad == 0.0
+
+
+def test_level_gyro_that_is_no_number_turns_nothing():
+    """The attitude kept stays one, and the commands stay finite."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 1.0)
+    aboard.fly(asking(Mode.COURSE), 6.0, estimate=poor())
+    aboard.row["gyro_b_rad_s"] = math.nan
+    commands = aboard.fly(asking(Mode.COURSE), 1.0, estimate=poor())
+    assert commands[-1].mode == Mode.LEVEL
+    assert np.isfinite(commands).all()
+
+
+@pytest.mark.parametrize("mode", BY_POSITION)
+def test_low_banks_little_and_climbs_until_it_is_safe(mode):
+    """Below 20 m until above 30 m; 25 m on the way down is not low, and on the way up still is."""
+    aboard, asked = Aboard(), asking(mode, height_m=60.0)
+    for height_m, expected in ((25.0, mode), (15.0, Mode.LOW), (25.0, Mode.LOW), (31.0, mode), (25.0, mode)):
+        aboard.height_m = height_m
+        command = aboard.fly(asked, 1.0)[-1]
+        assert command.mode == expected
+        if expected == Mode.LOW:
+            assert abs(command.bank_demand_rad) <= P.low_bank_rad
+            assert command.pitch_demand_rad > EnergyParams().pitch_trim_rad
+            assert command.throttle > EnergyParams().throttle_trim
+
+
+def test_low_climbs_although_less_height_was_asked_for():
+    """10 m is not flown at: it is below what is safe."""
+    aboard = Aboard()
+    aboard.height_m = 12.0
+    command = aboard.fly(asking(Mode.COURSE, height_m=10.0), 1.0)[-1]
+    assert command.pitch_demand_rad > EnergyParams().pitch_trim_rad
+
+
+@pytest.mark.parametrize("mode", [*OTHERS, Mode.LAUNCH])
+def test_low_is_nothing_to_launch_and_to_modes_without_a_height(mode):
+    """Whoever takes off or lands by hand is low."""
+    aboard = Aboard()
+    aboard.height_m = 2.0
+    assert aboard.modes(asking(mode), 5.0) == [(mode, 5.0)]
+
+
+def test_low_on_the_way_home_without_radio():
+    """Radio lost is RETURN, and RETURN climbs first."""
+    aboard = Aboard()
+    aboard.height_m = 5.0
+    assert aboard.fly(asking(Mode.STABILISE, radio=False), 1.0)[-1].mode == Mode.LOW
+
+
+def test_low_sailplane_keeps_its_glide_and_lands_nearly_straight():
+    """It cannot climb; 5 degrees of bank at most, and the pitch of the glide."""
+    aboard = Aboard("gentle_lady")
+    aboard.height_m = 6.0
+    command = aboard.fly(asking(Mode.RETURN), 1.0)[-1]
+    assert command.mode == Mode.LOW
+    assert abs(command.bank_demand_rad) <= math.radians(5.0) + 1e-12
+    assert command.throttle == 0.0
+
+
+def test_route_goes_on_to_the_same_waypoint_after_a_failsafe_and_begins_anew_when_another_is_given():
+    """The waypoint due is kept through circle and glide; a new route has its own first."""
+    aboard = Aboard()
+    on_the_way = Setpoint(Mode.WAYPOINTS, route=(Waypoint(201, 0, 60), Waypoint(900, 0, 60), Waypoint(0, 300, 60)))
+    due = aboard.autopilot._memory["s"]["next_waypoint"]
+    aboard.fly(on_the_way, 1.0)
+    assert due[0] == 1  # the first is where the aeroplane is
+    aboard.fly(on_the_way, 10.0, gps=False)
+    aboard.fly(on_the_way, 2.0)
+    assert due[0] == 1
+    aboard.fly(asking(Mode.WAYPOINTS), DT_S)
+    assert due[0] == 0
+
+
+def test_failsafes_snapshot_restored_continues_exactly():
+    """In the middle of a circle and of a level flight: time left, attitude kept and all."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.WAYPOINTS), 5.0)
+    aboard.fly(asking(Mode.WAYPOINTS), 20.0, gps=False, estimate=poor())
+    snapshot, row, ticks = aboard.autopilot.snapshot(), aboard.row.copy(), aboard.ticks
+    first = aboard.fly(asking(Mode.WAYPOINTS), 30.0, gps=False)
+    aboard.autopilot.restore(snapshot)
+    aboard.row, aboard.ticks = row, ticks
+    np.testing.assert_array_equal(aboard.fly(asking(Mode.WAYPOINTS), 30.0, gps=False), first)
+    assert {c.mode for c in first} == {Mode.CIRCLE, Mode.GLIDE}
