@@ -261,7 +261,10 @@ def throttle_for(pitch_rad, s, e):  # type: ignore[no-untyped-def]
 def throttle_to_recover(r_zx, pitch_rad, throttle):  # type: ignore[no-untyped-def]
     """The throttle of a pitch nobody asked for: shut as the nose drops far below the demand, full far above it.
 
-    r_zx : minus the sine of the pitch   pitch_rad : demanded
+    A motor that is to be off, in the hand or in a glide, stays off.   r_zx : minus the sine of the pitch
+    pitch_rad : demanded
     """
     dropped = r_zx + math.sin(pitch_rad)
+    if throttle <= 0.0:
+        return throttle
     return throttle + far_off(dropped) * ((0.0 if dropped > 0.0 else 1.0) - throttle)

@@ -24,7 +24,8 @@ class GuidanceParams:
 
     bank_per_heading : bank demanded per unit of sine of the heading error; larger is quicker, then weaves
     bank_limit_rad : the steepest bank ever demanded to turn, whatever the set-point allows
-    least_agility : the part of its bank that a turn into a strong wind keeps, see `agility`
+    slow_ground : of the cruise speed, the speed over the ground below which turns are gentler, see `agility`
+    least_agility : the part of its bank that a turn keeps however slow that is
     wind_share : of the airspeed, the most wind that is steered with
     gps_filter_s : age of a fix beyond its time stamp, from the filter inside the receiver
     gps_patience_s : age of a fix after which it is no longer believed
@@ -34,6 +35,7 @@ class GuidanceParams:
 
     bank_per_heading: float = 1.2
     bank_limit_rad: float = math.radians(85.0)
+    slow_ground: float = 0.9
     least_agility: float = 0.3
     wind_share: float = 0.8
     gps_filter_s: float = 1.0
@@ -100,14 +102,16 @@ def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, p):  # type: ignore[n
 
 @kernel
 def agility(s, cruise_m_s, p):  # type: ignore[no-untyped-def]
-    """The part of the bank that may be used where the heading is a course, 0..1: ground speed over cruise speed.
+    """The part of the bank that may be used where the heading is a course, 0..1, less over slow ground.
 
     A sideways acceleration a turns the course at a / v, v over the ground: into a strong wind many times as quickly
     as the nose, and the late GPS, from which such an estimator has its course, can follow only so much.
 
     s : record with `ground_m_s`
     """
-    return clip(s.ground_m_s / cruise_m_s, p.least_agility, 1.0) if math.isfinite(s.ground_m_s) else 1.0
+    if not math.isfinite(s.ground_m_s):
+        return 1.0
+    return clip(s.ground_m_s / (p.slow_ground * cruise_m_s), p.least_agility, 1.0)
 
 
 @kernel

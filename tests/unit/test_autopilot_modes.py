@@ -24,6 +24,7 @@ LEVEL = AttitudeEstimate(np.eye(3))
 def measurements(*, north_m=0.0, height_m=50.0, force_x=0.0):
     rows = np.zeros(1, MEASURED_DTYPE)
     rows["t_s"], rows["dt_s"], rows["gps_t_s"], rows["gps_valid"] = 10.0, 0.02, 9.7, 1
+    rows["gps_v_e_m_s"] = (12.6, 0.0, 0.0)
     rows["gps_p_e_m"], rows["force_b_m_s2"] = (north_m, 0.0, -height_m), (force_x, 0.0, -9.8)
     return Measurements(rows, 0)
 

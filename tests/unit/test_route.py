@@ -42,9 +42,9 @@ def records(route=None):
     params, whole = np.zeros(1, _PARAMS)[0], AutopilotParams(route=route or RouteParams())
     for name in ("route", "guidance"):
         params[name] = astuple(getattr(whole, name))
-    state = np.zeros(1, _STATE)[0]
-    state["airspeed_m_s"] = V
-    return params["route"], params["guidance"], state
+    s = np.zeros(1, _STATE)[0]
+    s["airspeed_m_s"] = s["airspeed_wanted_m_s"] = V
+    return params["route"], params["guidance"], s
 
 
 def asked_of(setpoint):
