@@ -1,4 +1,4 @@
-"""The scripted stick: set-points by time since the release, and builders of whole manoeuvres."""
+"""The scripted stick: set-points by time since the release; figures for it are in `autopilot.manoeuvres`."""
 
 import math
 from bisect import bisect_right
@@ -54,43 +54,6 @@ class Manoeuvre(NamedTuple):
 
     timed: tuple[Timed, ...]
     ends_s: float
-
-
-def inside_loops(
-    begin_s: float,
-    count: int,
-    after: Setpoint,
-    *,
-    pitch_rate_rad_s: float = math.radians(100.0),
-    run_in_s: float = 3.0,
-    run_in_pitch_rad: float = 0.0,
-    throttle: float = 1.0,
-) -> Manoeuvre:
-    """Inside loops at a constant pitch rate, wings left alone, after a run-in that gathers speed.
-
-    Parameters
-    ----------
-    begin_s             start of the run-in, since the release
-    count               loops
-    after               what to fly when the last loop ends: level flight, usually
-    pitch_rate_rad_s    slower is larger and asks more speed at the top, quicker asks more lift at the bottom
-    run_in_s, run_in_pitch_rad   wings level, before the pull: time and pitch
-    throttle            of run-in and loops, 0..1
-
-    Returns
-    -------
-    Manoeuvre           `ends_s` is when the last loop ends, 2 pi / pitch rate each
-    """
-    if count < 1 or not pitch_rate_rad_s > 0.0 or not run_in_s > 0.0:
-        raise ValueError(
-            f"inside_loops: count {count}, pitch_rate_rad_s {pitch_rate_rad_s!r}, run_in_s {run_in_s!r} s "
-            "must be at least 1, and positive"
-        )
-    pull_s = begin_s + run_in_s
-    ends_s = pull_s + count * 2.0 * math.pi / pitch_rate_rad_s
-    run_in = Setpoint(Mode.STABILISE, pitch_rad=run_in_pitch_rad, throttle=throttle)
-    pull = Setpoint(Mode.RATE, rate_b_rad_s=(0.0, pitch_rate_rad_s, 0.0), throttle=throttle)
-    return Manoeuvre((Timed(begin_s, run_in), Timed(pull_s, pull), Timed(ends_s, after)), ends_s)
 
 
 def reversals(begin_s: float, every_s: float, count: int, course: Setpoint) -> Manoeuvre:

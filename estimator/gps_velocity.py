@@ -34,7 +34,7 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -52,6 +52,7 @@ from estimator.gyro_frame import (
 )
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import inlined, kernel
+from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
 from estimator.pi import feed_back
 from estimator.screening import (
     FORCE_RANGE_M_S2,
@@ -72,6 +73,8 @@ LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this clo
 COURSE, NOSE, MAGNETOMETER = 0, 1, 2
 YAW_REFERENCES = ("course", "nose", "magnetometer")
 
+_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
+
 YawReference = Literal["course", "nose", "magnetometer"]
 
 
@@ -91,7 +94,8 @@ class GpsVelocityParams:
     launch_gate : float        the stand-in corrects nothing while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
     min_speed_m_s : float      slowest speed at which a velocity tells a heading
     declination_rad : float    of magnetic from true north, positive east; for the magnetometer
-    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
+    calibration                of the magnetometer
+    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
     """
 
     yaw_reference: YawReference = "course"
@@ -107,18 +111,21 @@ class GpsVelocityParams:
     launch_gate: float = 0.2
     min_speed_m_s: float = 3.0
     declination_rad: float = 0.0
+    calibration: Calibration = field(default_factory=Calibration)
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S
     force_range_m_s2: float = FORCE_RANGE_M_S2
+    field_range_ut: float = FIELD_RANGE_UT
 
     def __post_init__(self) -> None:
         if self.yaw_reference not in YAW_REFERENCES:
             raise ValueError(f"yaw_reference is {self.yaw_reference!r}; it must be one of {', '.join(YAW_REFERENCES)}")
         positive = (
             "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2",
+            "field_range_ut",
         )  # fmt: skip
         for f in fields(self):
             value = getattr(self, f.name)
-            if f.name == "yaw_reference":
+            if f.name in ("yaw_reference", "calibration"):
                 continue
             if f.name == "declination_rad":
                 if not abs(value) <= math.pi:
@@ -128,7 +135,7 @@ class GpsVelocityParams:
                     raise ValueError(f"{f.name} is {value}; it must be more than zero")
             elif not 0.0 <= value < math.inf:
                 raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
-        for name in ("gyro_range_rad_s", "force_range_m_s2"):
+        for name in _RANGES:
             if getattr(self, name) > 1e4:
                 raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
         if self.gps_latency_s > LONGEST_LATENCY_S:
@@ -138,7 +145,7 @@ class GpsVelocityParams:
 _PARAMS = tuple(
     Column(f.name, (), "see GpsVelocityParams", integer=f.name == "yaw_reference")
     for f in fields(GpsVelocityParams)
-    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
+    if f.name not in ("calibration", *_RANGES)
 )
 _STATE = (
     Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
@@ -158,7 +165,7 @@ _STATE = (
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
 )
-STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + GYRO_FRAME + _PARAMS + _STATE)
+STATE_DTYPE = dtype_of(BELIEF + SCREEN + FIELD + WIND_FILTER + GYRO_FRAME + _PARAMS + _STATE)
 
 
 @kernel
@@ -301,10 +308,9 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
 @kernel
 def take_mag(row, s):  # type: ignore[no-untyped-def]
     """Turn the nose by what the horizontal field is off magnetic north."""
-    m = row.mag_b_ut
-    if not (abs(m[0]) < 1e4 and abs(m[1]) < 1e4 and abs(m[2]) < 1e4):
-        s.rejected += 1
+    if not take_field(row, s):
         return
+    m = s.field_b_ut
     apply_corrections(s)
     for i in range(3):
         s.error_g[i] = s.R_gb[i, 0] * m[0] + s.R_gb[i, 1] * m[1] + s.R_gb[i, 2] * m[2]
@@ -342,7 +348,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         s.fix_age_s += s.dt_s
         if row.gps_new:
             take_fix(row, s)
-        if row.mag_new and s.yaw_reference == MAGNETOMETER:
+        if s.yaw_reference == MAGNETOMETER:
             take_mag(row, s)
         if s.fix_age_s > LOCK_LIFE_S and s.yaw_reference != MAGNETOMETER:
             s.locked = 0
@@ -390,9 +396,11 @@ class GpsVelocity(Compiled):
         """
         s = self._state[0]
         self._state.fill(0)
-        for f in fields(self.params):
-            value = getattr(self.params, f.name)
-            s[f.name] = YAW_REFERENCES.index(value) if f.name == "yaw_reference" else value
+        for f in fields(Calibration):
+            s[f.name] = getattr(self.params.calibration, f.name)
+        for name in (*(column.name for column in _PARAMS), *_RANGES):
+            value = getattr(self.params, name)
+            s[name] = YAW_REFERENCES.index(value) if name == "yaw_reference" else value
         R = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         start_gyro_frame(s, R)
         s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)

@@ -17,7 +17,8 @@ Passes when    it survives; the nose truly came round three times, faster than 1
 import math
 
 from autopilot.interface import Mode, Setpoint
-from autopilot.pilot import Script, Timed, inside_loops
+from autopilot.manoeuvres import inside_loops
+from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
 from scenarios.harness.manoeuvres import loops_end_s, most_loops, turns_that_count

@@ -3,28 +3,32 @@
 =============  ===================================================================================================
 Story          Straight and level until everything has settled, a shallow dive for speed, then three loops at a
                constant pitch rate; the autopilot takes over and levels the wings.
+               Variant, outside loops: pushed from the top, one and then another, each after a dive of its own, for
+               upside down the wing lifts little and drags much.
 Verifies       Premerlani & Bizard: the matrix has no singular attitude (Eqn 17, 18-21) and the roll-pitch correction
                with its centrifugal term (Eqns 25-27) brings it back upright
 Aircraft       endurance
 Wind           3 m/s from any direction, turbulence W20 = 3 m/s
 Sensors        generic
 Passes when    it survives; the nose truly came round three times; from 10 to 30 s after the third loop inclination
-               error at most 5 degrees RMS
+               error at most 5 degrees RMS.  Outside: twice, the other way round; the same 5 degrees
 =============  ===================================================================================================
 """
 
 import math
 
 from autopilot.interface import Mode, Setpoint
-from autopilot.pilot import Script, Timed, inside_loops
+from autopilot.manoeuvres import DIVE, inside_loops, outside_loops
+from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import loops_end_s, most_loops, turns_that_count
-from scenarios.harness.metrics import after, inclination_error_deg, over, rms
+from scenarios.harness.manoeuvres import inverted, last, loops_end_s, most_loops, most_outside_loops, turns_that_count
+from scenarios.harness.metrics import after, end, height_m, inclination_error_deg, lowest, over, rms, start
 from scenarios.harness.scenario import Scenario
 
 LOOPS = 3
 LOOPED = loops_end_s(LOOPS)
+OUTSIDE, EVERY_S, PUSHED = 2, 25.0, last(inverted)
 
 
 def _script(config: FlightConfig) -> Script:
@@ -32,6 +36,17 @@ def _script(config: FlightConfig) -> Script:
     level = Setpoint(Mode.COURSE, course_rad=math.radians(config.heading_deg), height_m=m["height_m"])
     loops = inside_loops(m["first_s"], LOOPS, level, pitch_rate_rad_s=math.radians(m["pitch_rate_deg_s"]))
     return Script([Timed(0.0, level), *loops.timed])
+
+
+def _outside(config: FlightConfig) -> Script:
+    m = config.manoeuvre
+    level = Setpoint(Mode.COURSE, course_rad=math.radians(config.heading_deg), height_m=m["height_m"])
+    rate_rad_s = math.radians(m["pitch_rate_deg_s"])
+    first, second = (
+        outside_loops(begin_s, 1, level, pitch_rate_rad_s=rate_rad_s, run_in=DIVE)
+        for begin_s in (m["first_s"], m["first_s"] + EVERY_S)
+    )
+    return Script([Timed(0.0, level), *first.timed, *second.timed])
 
 
 SCENARIO = Scenario(
@@ -58,4 +73,32 @@ SCENARIO = Scenario(
         ),
     ),
     milestones={"third loop ended": lambda flight: [LOOPED(flight)]},
+)
+
+VARIANTS = {"outside": "Two outside loops, flown by a scripted stick."}
+
+SCENARIOS = (
+    SCENARIO,
+    SCENARIO.varied(
+        "outside",
+        VARIANTS["outside"],
+        {"duration_s": 100.0, "start.height_m": 150.0, "manoeuvre.height_m": 150.0, "manoeuvre.pitch_rate_deg_s": 68.0},
+        script=_outside,
+        checks=(
+            SURVIVED,
+            Check(
+                "outside loops flown", "turns", most_outside_loops, turns_that_count(OUTSIDE), ">="
+            ),  # 2.07, 0.13 left
+            Check("lowest height", "m", over(height_m, lowest, start, end), 60.0, ">="),  # 73.0, 13.0 left
+            Check(
+                "inclination error RMS",
+                "deg",
+                over(inclination_error_deg, rms, after(PUSHED, 10.0), after(PUSHED, 30.0)),
+                5.0,  # 2.1, 2.9 left
+                pooled="rms",
+                per_flight_limit=7.5,
+            ),
+        ),
+        milestones={"last upside down": lambda flight: [PUSHED(flight)]},
+    ),
 )

@@ -52,7 +52,7 @@ SCENARIO = Scenario(
     # Beside each limit: measured with the default estimator over seeds 0 to 9, pooled, and what is left.
     checks=(
         SURVIVED,
-        Check("waypoints reached", "", waypoints_reached(ROUTE), 24.0, ">="),  # 26, 2 left
+        Check("waypoints reached", "waypoints", waypoints_reached(ROUTE), 24.0, ">="),  # 26, 2 left
         Check("farthest off the legs", "m", over(off_route_m(ROUTE), highest, SETTLED), 35.0),  # 25.6, 9.4 left
         Check(
             "off the legs RMS",

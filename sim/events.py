@@ -12,7 +12,12 @@ from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.sensors.faults import Fault
 
 _GPS_SILENCE_S = 2.5  # without a fix for longer, the GPS counts as lost
-_PHASES = {Phase.HELD: "held in the hand", Phase.THROWN: "thrown", Phase.FLYING: "released"}
+_PHASES = {
+    Phase.HELD: "held in the hand",
+    Phase.THROWN: "thrown",
+    Phase.FLYING: "released",
+    Phase.RESTING: "at rest on the table",
+}
 _FAILSAFES = {
     Mode.CIRCLE: "no GPS",
     Mode.GLIDE: "no GPS for long",

@@ -24,6 +24,7 @@ class Phase(IntEnum):
     HELD = 0  # in the hand
     THROWN = 1  # being pushed
     FLYING = 2
+    RESTING = 3  # on a table, judged all the same
 
 
 TRUTH = (
@@ -44,7 +45,7 @@ TRUTH = (
     Column("throttle", (), "throttle position, 0..1"),
     Column("rotor_rpm", (), "propeller speed, revolutions per minute"),
     Column("thrust_n", (), "propeller thrust"),
-    Column("phase", (), "0 held, 1 thrown, 2 flying", integer=True),
+    Column("phase", (), "0 held, 1 thrown, 2 flying, 3 resting", integer=True),
     Column("gyro_bias_b_rad_s", (3,), "what the gyro reads without rotation and without noise, at this tick"),
     Column("force_bias_b_m_s2", (3,), "what the accelerometer reads without force and without noise"),
     Column("gps_p_e_m", (3,), "position inside the receiver, after its filter, before its latency"),

@@ -54,7 +54,7 @@ class Plant(Protocol):
     """What flies.  A plant owns the truth rows: `advance` fills row k, nothing else writes motion there."""
 
     dt_s: float  # length of a tick
-    release_s: float  # time of the release (0 where nothing is thrown); judged times count from here
+    release_s: float  # judged times count from here: time of the release; 0 where it starts in the air
 
     def reset(self, log: Log) -> None:
         """Put the aeroplane at its start; the rows of `log` are filled from tick 0 on."""

@@ -1,33 +1,54 @@
-"""What the sensors said as the aeroplane lay level on the ground, before a flight that starts in the air."""
+"""What the sensors said before the flight: as the aeroplane lay level on the ground, and turned on a table.
+
+Offsets, gains, irons and mounting are those of the flight, for they come from its streams.
+"""
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from autopilot.interface import NEUTRAL
-from estimator.interface import ImuSample
+from estimator.interface import Array, ImuSample
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import PrescribedPlant, Rest
+from sim.prescribed_plant import Motion, PrescribedPlant, Rest
 from sim.sensors.fitting import SuiteParams
 from sim.sensors.suite import Suite
+from sim.turn_table import TurnTable
 
 
 def sample_at_rest(params: SuiteParams, rates: Rates, seed: int, flight: int = 0) -> ImuSample | None:
-    """Mean inertial sample of the very sensors of a flight over ``board.rest_s``; None where that is 0.
-
-    Offsets, gains and mounting are those of the flight, for they come from its streams.
-    """
-    n_ticks = rates.ticks(params.board.rest_s)
-    if n_ticks == 0:
+    """Mean inertial sample of the very sensors of a flight over ``board.rest_s``; None where that is 0."""
+    if rates.ticks(params.board.rest_s) == 0:
         return None
-    log, plant, suite = Log.empty(n_ticks), PrescribedPlant(Rest(), rates), Suite(params, rates, seed, flight)
+    return mean_sample(_measured(Rest(), params.board.rest_s, params, rates, seed, flight))
+
+
+def field_on_turn_table(
+    params: SuiteParams, rates: Rates, seed: int, flight: int = 0, *, declination_rad: float = 0.0
+) -> Array:
+    """Readings of the very magnetometer of a flight on the calibration turn-table, shape (n, 3), microtesla.
+
+    The motor stands: what its current adds in flight is not in them.
+    """
+    table = TurnTable(declination_rad)
+    rows = _measured(table, table.duration_s, params, rates, seed, flight)
+    return np.asarray(rows["mag_b_ut"][rows["mag_new"] == 1])
+
+
+def _measured(
+    motion: Motion, duration_s: float, params: SuiteParams, rates: Rates, seed: int, flight: int
+) -> NDArray[Any]:
+    """Measured rows of the sensors of a flight on `motion`."""
+    log = Log.empty(rates.ticks(duration_s))
+    plant, suite = PrescribedPlant(motion, rates), Suite(params, rates, seed, flight)
     plant.reset(log)
     suite.reset(log)
-    for k in range(n_ticks):
+    for k in range(len(log)):
         plant.advance(k, NEUTRAL)
         suite.measure(k)
-    return mean_sample(log.measured)
+    return log.measured
 
 
 def mean_sample(rows: NDArray[Any]) -> ImuSample:

@@ -79,13 +79,13 @@ def _require(motion: object, name: str, unit: str, right: bool, choose: str) -> 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """Held still at the attitude given."""
+    """At rest at the attitude given, as on a table."""
 
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
     heading_rad: float = 0.0
     height_m: float = 1.7
-    phase: ClassVar[Phase] = Phase.HELD
+    phase: ClassVar[Phase] = Phase.RESTING
     wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
@@ -328,14 +328,19 @@ def motion_rows(motion: Motion, n_ticks: int, dt_s: float, latitude_rad: float) 
 
 
 class PrescribedPlant:
-    """A body that moves as `motion` says, whatever it is commanded; see `sim.plant.Plant`."""
+    """A body that moves as `motion` says, whatever it is commanded; see `sim.plant.Plant`.
 
-    def __init__(self, motion: Motion, rates: Rates, latitude_deg: float = LATITUDE_DEG) -> None:
+    release_s : time from which it is judged
+    """
+
+    def __init__(
+        self, motion: Motion, rates: Rates, latitude_deg: float = LATITUDE_DEG, release_s: float = 0.0
+    ) -> None:
         if not abs(latitude_deg) <= 90.0:
             raise ValueError(f"latitude_deg = {latitude_deg!r} deg: choose a latitude from -90 to 90 deg")
         self.motion = motion
         self.dt_s = rates.dt_s
-        self.release_s = 0.0
+        self.release_s = release_s
         self.latitude_deg = latitude_deg
         self._truth = self._rows = np.zeros(0, TRUTH_DTYPE)
 

@@ -53,7 +53,7 @@ _PALE = 0.75
 _CHASE_S = 1.5  # the chase view follows the path smoothed over about so long
 _LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
 _LANE_COLOURS: dict[str, dict[str, Colour]] = {
-    "phase": {"held": (90, 95, 105), "thrown": (190, 140, 50), "flying": (45, 110, 125)},
+    "phase": {"held": (90, 95, 105), "thrown": (190, 140, 50), "flying": (45, 110, 125), "resting": (90, 95, 105)},
     "estimator": {"starting": (90, 95, 105), "good": (50, 125, 80), "poor": (180, 60, 60)},
 }
 

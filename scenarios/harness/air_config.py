@@ -5,7 +5,7 @@ Directions are those that the air comes FROM, in degrees from north over east.
 
 import math
 import re
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
@@ -20,6 +20,7 @@ GUST_LENGTH_S = 2.0
 _NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
 _GUST = re.compile(rf"({_NUMBER})@({_NUMBER})s?(?:/({_NUMBER})s?)?(?::(up|down|along|across|{_NUMBER}))?")
 Degrees = Annotated[float, Field(ge=0.0, le=360.0)]
+FromWord = Literal["random", "cross", "head", "tail"]
 Place = tuple[float, float]
 
 
@@ -45,7 +46,7 @@ class GustConfig(_Model):
 class AirConfig(_Model):
     """The mean wind at 10 m, and what rides on it.
 
-    wind_from_deg : "random" any direction; "cross" from the left or the right of the start
+    wind_from_deg : "random" any direction; by the heading at the start "cross" from its left or right, "head", "tail"
     shear : exponent of the wind's growth with height, 0 none, 0.14 open country, see `sim.air.profile`
     gusts : each as a `GustConfig` or as text, see `parse_gust`
     turbulence_w20_m_s : wind speed at 20 ft that scales the turbulence, MIL-F-8785C, 0 none; or light, moderate, severe
@@ -54,13 +55,18 @@ class AirConfig(_Model):
     """
 
     wind_m_s: float = Field(default=0.0, ge=0.0, le=FASTEST_WIND_M_S)
-    wind_from_deg: Degrees | Literal["random", "cross"] = 0.0
+    wind_from_deg: Degrees | FromWord = 0.0
     shear: float = Field(default=0.0, ge=0.0, le=1.0)
     gusts: tuple[GustConfig, ...] = ()
     turbulence_w20_m_s: float = Field(default=0.0, ge=0.0, le=FASTEST_WIND_M_S)
     thermals: int | tuple[Place, ...] = 0
     thermal_m_s: float = Field(default=2.0, ge=0.0, le=10.0)
     inversion_m: float = Field(default=1200.0, ge=100.0, le=10000.0)
+
+    @property
+    def calm(self) -> bool:
+        """Whether nothing moves in it."""
+        return not (self.wind_m_s or self.gusts or self.turbulence_w20_m_s or self.thermals)
 
     @field_validator("gusts", mode="before")
     @classmethod
@@ -89,13 +95,14 @@ class Wind(NamedTuple):
     """Speed of the wind and where it comes from."""
 
     m_s: float
-    from_deg: float | Literal["random", "cross"]
+    from_deg: float | FromWord
 
 
 def parse_wind(text: str) -> Wind:
     """Wind of what a person types: ``5@270`` is 5 m/s from the west.
 
-    Also ``5@random``, ``5@cross`` (from the left or the right of the start heading), and ``0`` or ``calm``.
+    Also ``5@random``, by the heading at the start ``5@cross`` (from its left or its right), ``5@head`` and ``5@tail``,
+    and ``0`` or ``calm``.
 
     Raises
     ------
@@ -104,17 +111,16 @@ def parse_wind(text: str) -> Wind:
     tidy = text.strip().lower()
     if tidy in ("0", "calm"):
         return Wind(0.0, 0.0)
-    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)@(random|cross|\d+(?:\.\d*)?)", tidy)
-    right = "write speed@direction it comes from, for instance 5@270, 5@random or 5@cross, or calm"
+    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)@(random|cross|head|tail|\d+(?:\.\d*)?)", tidy)
+    right = "write speed@direction it comes from, for instance 5@270, 5@random, 5@cross, 5@head or 5@tail, or calm"
     if not found:
         raise ValueError(f"wind = {text!r}: {right}")
     m_s, direction = float(found[1]), found[2]
     if m_s > FASTEST_WIND_M_S:
         raise ValueError(f"wind = {text!r}: {m_s:g} m/s is too much, at most {FASTEST_WIND_M_S:g} m/s")
-    if direction == "random":
-        return Wind(m_s, "random")
-    if direction == "cross":
-        return Wind(m_s, "cross")
+    for word in get_args(FromWord):
+        if direction == word:
+            return Wind(m_s, word)
     if float(direction) > 360.0:
         raise ValueError(f"wind = {text!r}: direction {direction} deg is outside 0 to 360 deg; {right}")
     return Wind(m_s, float(direction))
@@ -173,7 +179,8 @@ def resolve_air(air: AirConfig, heading_deg: float, seed: int, flight: int) -> A
     from_deg = air.wind_from_deg
     if isinstance(from_deg, str):
         draw = stream(seed, flight, "wind_direction").random()
-        from_deg = 360.0 * draw if from_deg == "random" else (heading_deg + (90.0 if draw < 0.5 else 270.0)) % 360.0
+        right_of_nose_deg = {"cross": 90.0 if draw < 0.5 else 270.0, "head": 0.0, "tail": 180.0}
+        from_deg = 360.0 * draw if from_deg == "random" else (heading_deg + right_of_nose_deg[from_deg]) % 360.0
     words = {"along": float(from_deg), "across": float(from_deg + 90.0) % 360.0}
     gusts = tuple(
         gust.model_copy(update={"from_deg": words[gust.from_deg]}) if isinstance(gust.from_deg, str) else gust

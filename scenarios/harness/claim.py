@@ -10,7 +10,7 @@ refuted                     neither
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Literal
 
@@ -28,6 +28,11 @@ class Paper(StrEnum):
     STARLINO = "Starlino 2011, DCM Tutorial: An Introduction to Orientation Kinematics"
     DILSHAD = "Dilshad & Jahan 2014, An Improvement Strategy on DCM-based Attitude Estimation for Multi-Rotor Autopilot"
     VAN_ZUNDERT = "van Zundert 2013, Direction Cosine Matrix based IMU Implementation in Matlab/Simulink"
+
+    @property
+    def short(self) -> str:
+        """Authors and year."""
+        return self.partition(",")[0]
 
 
 class Verdict(StrEnum):
@@ -75,6 +80,24 @@ class Finding:
         if all(row.passed for row in self.stands):
             return Verdict.CONFIRMED
         return Verdict.WITH_CONDITION if self.under and all(row.passed for row in self.under) else Verdict.REFUTED
+
+    def undrawn(self) -> "Finding":
+        """The same without its picture, which can be sent to another process."""
+        return replace(self, draw=_nothing)
+
+
+def _nothing(figure: "Figure") -> None:
+    """Draw nothing."""
+
+
+def deciding(finding: Finding) -> Row:
+    """The line that decides: the first that does not hold, or of those that hold the one with the least margin."""
+    rows = finding.stands
+    return next((row for row in rows if not row.passed), min(rows, key=_margin))
+
+
+def _margin(row: Row) -> float:
+    return abs(row.limit - row.measured) / max(abs(row.limit), abs(row.measured), 1e-12)
 
 
 @dataclass(frozen=True, slots=True)

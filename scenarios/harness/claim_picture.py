@@ -3,8 +3,8 @@
 Imported only when a picture is drawn: it brings matplotlib.
 """
 
+import io
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -13,18 +13,20 @@ from matplotlib.figure import Figure
 
 from scenarios.harness.handbook_picture import BLUE, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
 
-__all__ = ["BLUE", "FAINT", "GREEN", "GRID", "INK", "ORANGE", "RED", "TEAL", "VIOLET", "axes", "label", "save"]
+__all__ = ["BLUE", "FAINT", "GREEN", "GRID", "INK", "ORANGE", "RED", "TEAL", "VIOLET", "axes", "label", "png"]
 
 SIZE, DPI = (9.0, 3.6), 110
 
 
-def save(draw: Callable[[Figure], None], path: Path) -> None:
-    """Let `draw` fill a figure of the common size and style, and write it to `path`."""
+def png(draw: Callable[[Figure], None]) -> bytes:
+    """The picture that `draw` makes of an empty figure of the common size and style: the same bytes each time."""
+    buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, facecolor="white", layout="constrained")
         FigureCanvasAgg(figure)
         draw(figure)
-        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})  # no version: it would differ
+    return buffer.getvalue()
 
 
 def axes(figure: Figure, *titles: str) -> list[Any]:

@@ -1,19 +1,15 @@
-"""The command line: ``wingslevel list | fly | check | compare | replay | bench | aircraft | sensors | export | view``.
+"""The command line: ``wingslevel list | fly | check | compare | claims | replay | bench | aircraft | ...``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
 imports wait until a command needs them.
 """
 
-import json
-import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from importlib.metadata import version as version_of
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -43,7 +39,13 @@ from scenarios.harness.cli_options import (
     WebOption,
     WindOption,
     WorkersOption,
+    air,
+    changes_of,
+    fitted,
+    given,
+    names_of,
 )
+from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
 from scenarios.harness.console import INTERRUPTED, USAGE
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
@@ -77,19 +79,6 @@ def run(arguments: list[str]) -> int:
     return code
 
 
-@contextmanager
-def usage() -> Iterator[None]:
-    """What is refused inside the block is the user's to mend: one line, exit code 2."""
-    try:
-        yield
-    except ValueError as problem:
-        raise _refusal(str(problem)) from problem
-
-
-def _refusal(message: str) -> typer.TyperException:
-    return typer.TyperException(message)
-
-
 @app.callback(invoke_without_command=True)
 def _root(
     context: typer.Context,
@@ -107,7 +96,7 @@ def list_(json_: JsonOption = None) -> None:
     """What there is: scenarios, estimators, autopilots, aircraft, sensor suites, parts."""
     from scenarios.harness.catalogue import catalogue
 
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         found = catalogue()
         for kind, things in found.items():
             console.out().print(console.name_table(kind, things))
@@ -143,12 +132,12 @@ def fly(
     """Fly a scenario once, record it, judge it."""
     from scenarios.harness import single, viewing
 
-    named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault) | _given(
+    named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault) | given(
         {"estimator": estimator, "duration_s": duration, "seed": seed}
     )
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         with usage():
-            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
+            changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
             flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web)
         single.tell(flown)
         report(flown.to_json())
@@ -182,12 +171,12 @@ def check(
     """The gate for CI: fly scenarios on many seeds, judge each flight and all of them pooled."""
     from scenarios.harness import gate
 
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         with usage():
             for path in (junit, markdown):
-                _check_file(path)
-            named = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
-            changes = _changes(set_) | named | _air(wind, shear, gust, turbulence, thermals)
+                check_file(path)
+            named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
+            changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
@@ -195,8 +184,8 @@ def check(
             with console.progress("flying", "flights") as advance:
                 verdict, whole = gate.fly_all(tasks, workers or gate.processors(), advance)
         if whole:
-            _write(junit, verdict.to_junit)
-            _write(markdown, verdict.to_markdown)
+            write(junit, verdict.to_junit)
+            write(markdown, verdict.to_markdown)
         report(verdict.to_json() | ({} if whole else {"passed": False, "interrupted": True}))
         gate.tell(verdict)  # last: a reader who closes the pipe loses no report
         if not whole:
@@ -230,14 +219,14 @@ def compare(
     from scenarios.harness import compare as comparing
     from scenarios.harness import gate, handbook
 
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         with usage():
-            _check_file(picture)
-            _check_file(markdown)
+            check_file(picture)
+            check_file(markdown)
             handbook.check_picture(picture)
-            fitted = _fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
-            changes = _changes(set_) | fitted | _air(wind, shear, gust, turbulence, thermals)
-            plan = comparing.prepare(scenario, _names(estimators), gate.parse_seeds(seeds), changes)
+            carried = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
+            changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
+            plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
                 compared = comparing.fly(plan, workers or gate.processors(), advance)
@@ -246,10 +235,50 @@ def compare(
 
             with usage():
                 compare_picture.draw(compared, picture)
-        _write(markdown, compared.to_markdown)
+        write(markdown, compared.to_markdown)
         report(compared.to_json())
         comparing.tell(compared)  # last: a reader who closes the pipe loses no report
     return compared.exit_code
+
+
+@app.command()
+def claims(
+    names: Annotated[list[str] | None, typer.Argument(help="Claims, or patterns as offset*; all by default.")] = None,
+    seeds: Annotated[
+        str | None, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7. [default: of each claim]")
+    ] = None,
+    workers: WorkersOption = None,
+    list_only: Annotated[bool, typer.Option("--list", help="Say what claims there are, and measure none.")] = False,
+    pictures: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Draw them. [default: images beside the Markdown]")
+    ] = None,
+    markdown: MarkdownOption = None,
+    json_: JsonOption = None,
+) -> int:
+    """What the papers claim, put to the test: each with its numbers, its verdict and its picture."""
+    from scenarios.harness import claim_report, claim_run, gate
+    from scenarios.harness.claim_registry import matching
+
+    with reporting(json_) as report:
+        with usage():
+            wanted = matching(names or [])
+            if list_only:
+                report(claim_report.listed(wanted))
+                claim_report.tell_list(wanted)
+                return 0
+            check_file(markdown)
+            folder = claim_report.folder_of_pictures(markdown, pictures)
+            numbers = None if seeds is None else gate.parse_seeds(seeds)
+            console.warn_if_cold()
+            with console.progress("measuring", "claims") as advance:
+                findings = claim_run.measure(
+                    wanted, numbers, workers or gate.processors(), advance, drawn=folder is not None
+                )
+        claim_report.write_all(findings, markdown, folder)
+        report(findings.to_json())
+        # Last: a reader who closes the pipe loses no file.
+        claim_report.tell(findings, detailed=bool(names) and len(wanted) == 1)
+    return findings.exit_code
 
 
 @app.command()
@@ -271,16 +300,16 @@ def replay(
     from scenarios.harness import replaying
     from scenarios.harness.replay import Window
 
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         with usage():
             told = replaying.run(
                 log,
-                _names(estimator),
+                names_of(estimator),
                 out,
                 reference=reference,
                 columns=columns,
                 imu=imu,
-                params=_changes(set_),
+                params=changes_of(set_),
                 window=Window(airborne, settle, calibration),
                 rerun=not no_rerun,
             )
@@ -299,7 +328,7 @@ def bench(
     json_: JsonOption = None,
 ) -> int:
     """Speed: the closed loop against bare JSBSim in the same run, and the estimator alone."""
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         from scenarios.harness import bench as benchmark
 
         console.warn_if_cold()
@@ -319,9 +348,9 @@ def aircraft(
     """The handbook page of an aeroplane: speeds, glide, climb, turns, stability and natural modes."""
     from scenarios.harness import handbook
 
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         with usage():
-            _check_file(picture)
+            check_file(picture)
             handbook.check_picture(picture)
             book = handbook.make(name)
         if picture is not None:
@@ -344,17 +373,17 @@ def sensors(
     """What sensors there are, or the page of one: its data sheet, its Allan deviation, what it does to a signal."""
     from scenarios.harness import sensor_names
 
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         if part is None:
             if picture is not None:
-                raise _refusal(f"--picture {picture}: name the part or the suite to draw")
+                raise refusal(f"--picture {picture}: name the part or the suite to draw")
             report(sensor_names.to_json())
             sensor_names.tell()
             return
         from scenarios.harness import sensor_page
 
         with usage():
-            _check_file(picture)
+            check_file(picture)
             sensor_page.check_picture(picture)
             subject = sensor_names.subject(part)
             sensor_page.check_rates(subject, part)
@@ -383,15 +412,15 @@ def export(
     json_: JsonOption = None,
 ) -> None:
     """The GPS fixes of a recording, as the sentences and messages that a receiver sends."""
-    with _reporting(json_) as report:
+    with reporting(json_) as report:
         with usage():
             from scenarios.harness import exporting, viewing
 
             for path in (nmea, ubx):
-                _check_file(path)
+                check_file(path)
             done = exporting.make(flight or viewing.newest(FLIGHTS), nmea, ubx, exporting.parse_start(start))
         for path, data in done.files.values():
-            _write(path, partial(bytes, data))
+            write(path, partial(bytes, data))
         report(done.to_json())
         exporting.tell(done)  # last: a reader who closes the pipe loses no file
 
@@ -409,92 +438,3 @@ def view(
     with usage():
         shown = viewing.open_flight(flight or viewing.newest(FLIGHTS), web=web)
     viewing.stay(shown)
-
-
-def _changes(assignments: list[str] | None) -> dict[str, Any]:
-    """Overrides of ``--set name=value``."""
-    changes = {}
-    for text in assignments or []:
-        name, equals, value = text.partition("=")
-        if not (name.strip() and equals):
-            raise _refusal(f"--set {text!r}: write name=value, for instance gps.latency_s=0.5")
-        changes[name.strip()] = value.strip()
-    return changes
-
-
-def _fitted(
-    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None,
-    faults: list[str] | None,
-) -> dict[str, Any]:  # fmt: skip
-    """What flies, what it carries and what of that fails, by the names of the configuration."""
-    named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
-    return _given(named | {"suite": suite, "faults": faults or None})
-
-
-def _given(named: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in named.items() if value is not None}
-
-
-def _air(
-    wind: str | None, shear: str | None, gust: list[str] | None, turbulence: str | None, thermals: str | None
-) -> dict[str, Any]:
-    """Overrides of the options about the air."""
-    named = {"wind": wind, "air.shear": shear, "air.gusts": gust or None}
-    return _given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
-
-
-def _names(text: str | None) -> list[str]:
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
-
-
-@contextmanager
-def _reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
-    """Gives what writes the JSON.  Where that goes to standard output, everything else goes to standard error."""
-    if target == "-":
-        stdout = sys.stdout
-        with redirect_stdout(sys.stderr):
-            yield lambda data: print(_text(data), file=stdout)
-    else:
-        path = Path(target) if target is not None else None
-        with usage():
-            _check_file(path)
-        yield lambda data: _write(path, lambda: _text(data) + "\n")
-
-
-def _text(data: Any) -> str:
-    return json.dumps(data, indent=2, allow_nan=False)
-
-
-def _check_file(path: Path | None) -> None:
-    """Refuse, before flying, a report that could not be written."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise _refusal(f"cannot write to {path}: it is a folder")
-    if not path.parent.is_dir():
-        raise _refusal(f"cannot write to {path}: there is no folder {path.parent}")
-    # A file is replaced, which its folder must allow; a device or a pipe is written to.
-    target = path.resolve()
-    if not os.access(target if _is_stream(target) else target.parent, os.W_OK):
-        raise _refusal(f"cannot write to {path}: permission denied")
-
-
-def _is_stream(path: Path) -> bool:
-    """Whether `path` is there, and is neither a file nor a folder: /dev/stdout, a pipe."""
-    return path.exists() and not path.is_file() and not path.is_dir()
-
-
-def _write(path: Path | None, content: Callable[[], str | bytes]) -> None:
-    """Write a report, complete or not at all."""
-    if path is None:
-        return
-    from sim.recording import replacing
-
-    made = content()
-    data = made.encode("utf-8") if isinstance(made, str) else made
-    target = path.resolve()  # what a link points to is replaced, not the link
-    if _is_stream(target):
-        target.write_bytes(data)
-        return
-    with usage(), replacing(target) as temporary:
-        temporary.write_bytes(data)

@@ -1,9 +1,11 @@
-"""The options of the command line that several commands take."""
+"""The options that several commands take, and what they change in the configuration of a flight."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+
+from scenarios.harness.cli_reports import refusal
 
 EstimatorOption = Annotated[
     str | None, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
@@ -14,7 +16,7 @@ SetOption = Annotated[
 ]
 WindOption = Annotated[
     str | None,
-    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, calm."),
+    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, 5@head, calm."),
 ]
 ShearOption = Annotated[
     str | None,
@@ -85,3 +87,41 @@ ParameterOption = Annotated[
 LogEstimatorsOption = Annotated[
     str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
 ]
+
+
+def changes_of(assignments: list[str] | None) -> dict[str, Any]:
+    """Overrides of ``--set name=value``."""
+    changes = {}
+    for text in assignments or []:
+        name, equals, value = text.partition("=")
+        if not (name.strip() and equals):
+            raise refusal(f"--set {text!r}: write name=value, for instance gps.latency_s=0.5")
+        changes[name.strip()] = value.strip()
+    return changes
+
+
+def fitted(
+    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None,
+    faults: list[str] | None,
+) -> dict[str, Any]:  # fmt: skip
+    """What flies, what it carries and what of that fails, by the names of the configuration."""
+    named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
+    return given(named | {"suite": suite, "faults": faults or None})
+
+
+def given(named: dict[str, Any]) -> dict[str, Any]:
+    """Those of `named` that were given on the command line."""
+    return {name: value for name, value in named.items() if value is not None}
+
+
+def air(
+    wind: str | None, shear: str | None, gust: list[str] | None, turbulence: str | None, thermals: str | None
+) -> dict[str, Any]:
+    """Overrides of the options about the air."""
+    named = {"wind": wind, "air.shear": shear, "air.gusts": gust or None}
+    return given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
+
+
+def names_of(text: str | None) -> list[str]:
+    """Names of a list with commas."""
+    return [name.strip() for name in (text or "").split(",") if name.strip()]

@@ -104,13 +104,35 @@ class HandThrowStart(_Model):
         return self
 
 
+class BenchStart(_Model):
+    """At rest on a table indoors, and it stays there: no air moves, no motor runs, no command does anything.
+
+    height_m : of the table     calibration_s : from power-up, over which the gyro offset is measured; what is judged
+    begins after it
+    """
+
+    kind: Literal["bench"] = "bench"
+    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
+    roll_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
+    pitch_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
+    height_m: float = Field(default=0.8, ge=0.0, le=10.0)
+    calibration_s: float = Field(default=2.0, ge=0.0, le=600.0)
+
+
+AnyStart = InFlightStart | HandThrowStart | BenchStart
+
+
 class FlightConfig(_Model):
     """Everything that decides a flight, beside the code.
 
     estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
     estimator_params : fields of the estimator's parameter dataclass
+    suits : what is known of the instruments aboard, by the names of such fields, ``{"gps_latency_s": 1.0}``; told to
+    any estimator that has a field of that name
     duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
     changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
+    turn_table : the magnetometer was turned on a table before the flight: an estimator that has a parameter
+    ``calibration`` is given what that tells, see `compass`
     files : path -> text of the files of one's own that the suite is made of; a resolved configuration holds them
     manoeuvre : the scenario's own parameters
     faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
@@ -121,15 +143,17 @@ class FlightConfig(_Model):
     aircraft: str = "endurance"
     estimator: str = "premerlani"
     estimator_params: dict[str, Any] = Field(default_factory=dict)
+    suits: dict[str, float] = Field(default_factory=dict)
     autopilot: str = "dcm"
     duration_s: float = Field(default=60.0, gt=0.0, le=36000.0)
     rates: RatesConfig = Field(default_factory=RatesConfig)
     suite: str = "generic"
     sensors: dict[str, Figure] = Field(default_factory=dict)
+    turn_table: bool = False
     files: dict[str, str] = Field(default_factory=dict)
     faults: tuple[str, ...] = ()
     air: AirConfig = Field(default_factory=AirConfig)
-    start: Annotated[InFlightStart | HandThrowStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
+    start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
     box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
     box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
@@ -141,6 +165,12 @@ class FlightConfig(_Model):
     def _typed_faults(cls, faults: Any) -> Any:
         return typed_faults(faults)
 
+    @model_validator(mode="after")
+    def _calm_indoors(self) -> "FlightConfig":
+        if isinstance(self.start, BenchStart) and not self.air.calm:
+            raise ValueError("air: it rests on a table indoors, where no air moves; leave wind, gusts and the rest out")
+        return self
+
     @property
     def heading_deg(self) -> float:
         """Heading at the start; ValueError where it has not been drawn yet."""
@@ -151,8 +181,18 @@ class FlightConfig(_Model):
 
     @property
     def held_s(self) -> float:
-        """From power-up to the release."""
-        return self.start.hold_s + self.start.push_s if isinstance(self.start, HandThrowStart) else 0.0
+        """From power-up to the release; on a table, to the end of the calibration."""
+        match self.start:
+            case HandThrowStart(hold_s=hold_s, push_s=push_s):
+                return hold_s + push_s
+            case BenchStart(calibration_s=calibration_s):
+                return calibration_s
+        return 0.0
+
+    @property
+    def calibration_s(self) -> float:
+        """From power-up, over which the gyro offset is measured; 0 where the flight starts in the air."""
+        return 0.0 if isinstance(self.start, InFlightStart) else self.start.calibration_s
 
 
 def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig:
@@ -177,7 +217,10 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
             _put(data, _full_name(name, config), value)
     changed = validated(FlightConfig, data)
     # Refuses a suite, a value or a fault that cannot be.
-    require_faults_possible(changed.faults, suite_params(changed.suite, changed.sensors, changed.files))
+    fitted = suite_params(changed.suite, changed.sensors, changed.files)
+    require_faults_possible(changed.faults, fitted)
+    if changed.turn_table and fitted.magnetometer is None:
+        raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed
 
 
@@ -187,7 +230,7 @@ def _full_name(name: str, config: FlightConfig) -> str:
     fields = dotted_fields(fitted)
     if name in fields:
         return f"sensors.{name}"
-    open_ended = name.startswith("estimator_params.")  # the estimator's own dataclass checks these
+    open_ended = name.startswith(("estimator_params.", "suits."))  # the estimator's own dataclass checks these
     known = [*_dotted(config), *(f"sensors.{f}" for f in fields), "wind"]
     if name not in known and not open_ended:
         require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
@@ -203,7 +246,7 @@ def _dotted(config: FlightConfig) -> list[str]:
             names += [f"{name}.{inner}" for inner in type(value).model_fields if inner != "kind"]
         elif name == "manoeuvre":
             names += [f"{name}.{inner}" for inner in value]
-        elif name not in ("sensors", "estimator_params", "files"):
+        elif name not in ("sensors", "estimator_params", "suits", "files"):
             names.append(name)
     return names
 
@@ -252,7 +295,7 @@ def _resolve_rates(config: FlightConfig) -> RatesConfig:
 
 
 def _resolve_start(config: FlightConfig) -> Any:
-    start: InFlightStart | HandThrowStart = config.start
+    start: AnyStart = config.start
     if start.heading_deg == "random":
         heading_deg = 360.0 * float(stream(config.seed, config.flight, "start_heading").random())
         start = start.model_copy(update={"heading_deg": heading_deg})

@@ -6,13 +6,14 @@ terminal, or where FORCE_COLOR is set, and never where NO_COLOR is.  Tables fit 
 
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from scenarios.harness.checks import Row
     from scenarios.harness.config import FlightConfig
@@ -53,6 +54,15 @@ def warn_if_cold() -> None:
         err().print("compiling the kernels, this once: about half a minute", style="dim")
 
 
+def note_left_out(scenarios: Sequence[str]) -> None:
+    """Say which scenarios are not flown with an estimator of one's own, on one line of standard error."""
+    if scenarios:
+        names = ", ".join(scenarios)
+        err().print(
+            f"left out (passing where the scenario's own estimator fails): {names}", style="dim", soft_wrap=True
+        )
+
+
 def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
     """Say which faults the flight is too short for, each on a line of standard error."""
     from scenarios.harness.fault_config import never_met
@@ -71,7 +81,19 @@ def number(value: float) -> str:
     return f"{value:.1e}" if 0.0 < abs(value) < 0.005 else f"{value:.2f}"
 
 
-def verdict_table(title: str, rows: Sequence["Row"]) -> "Table":
+def figures(value: float) -> str:
+    """`value` to three significant digits, for figures of very different size; powers of ten beyond 0.001..99999."""
+    if not math.isfinite(value):
+        return "none"
+    if value == 0.0:
+        return "0"
+    if not 1e-3 <= abs(value) < 1e5:
+        return f"{value:.1e}"
+    size = abs(float(f"{value:.2e}"))  # rounded first: 9.996 is 10.0
+    return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
+
+
+def verdict_table(title: str, rows: Sequence["Row"], written: Callable[[float], str] = number) -> "Table":
     """The verdict on one flight, or on several pooled: check, measured, limit, unit, pass."""
     from rich.text import Text
 
@@ -81,7 +103,18 @@ def verdict_table(title: str, rows: Sequence["Row"]) -> "Table":
     for row in rows:
         word = Text("pass", "green") if row.passed else Text("FAIL", "bold red")
         name = Text(f"{row.name} ({row.note})" if row.note else row.name)
-        grid.add_row(name, number(row.measured), f"{row.sense} {number(row.limit)}", Text(row.unit), word)
+        grid.add_row(name, written(row.measured), f"{row.sense} {written(row.limit)}", Text(row.unit), word)
+    return grid
+
+
+def claim_table(title: str, lines: Sequence[tuple[str, "Text", str]]) -> "Table":
+    """Claims of a paper: name, verdict, and the line that decides it."""
+    grid = _table(title)
+    grid.show_header = False
+    for wraps in (False, False, True):
+        grid.add_column(no_wrap=not wraps)
+    for name, verdict, decides in lines:
+        grid.add_row(name, verdict, decides)
     return grid
 
 

@@ -7,17 +7,28 @@ from typing import Any
 
 from estimator.interface import AttitudeEstimator
 from scenarios.harness.air_config import build_air
-from scenarios.harness.config import FlightConfig, HandMotion, HandThrowStart, override, resolve
+from scenarios.harness.compass import with_compass
+from scenarios.harness.config import (
+    BenchStart,
+    FlightConfig,
+    HandMotion,
+    HandThrowStart,
+    InFlightStart,
+    override,
+    resolve,
+)
 from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, with_params
+from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, suited, with_params
 from scenarios.harness.scenario import Scenario
+from sim.clock import Rates
 from sim.events import events_of_faults
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Flight, Log
 from sim.loop import Watch, fly
-from sim.plant import HandThrow, InFlight, Start
+from sim.plant import HandThrow, InFlight, Plant, Start
 from sim.power_up import sample_at_rest
+from sim.prescribed_plant import PrescribedPlant, Rest
 from sim.sensors.suite import Suite
 
 Maker = Callable[[], AttitudeEstimator]
@@ -63,23 +74,15 @@ def fly_config(
     The resolved configuration is the manifest's ``config``: ``fly_config(scenario, FlightConfig(**that))`` flies
     the same flight again.
     """
-    config = resolve(config)
+    config = resolve(config) if maker is not None else with_compass(resolve(config))
     rates = config.rates.build()
-    estimator = maker() if maker is not None else _estimator(config)
+    estimator = maker() if maker is not None else estimator_of(config)
     pilot = load_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft)
     script = scenario.script(config)
-    plant = JsbsimPlant(
-        config.aircraft,
-        start=start_of(config),
-        air=build_air(config.air),
-        rates=rates,
-        seed=config.seed,
-        flight=config.flight,
-        box=FlightBox(config.box_radius_m, config.box_height_m),
-    )
+    plant = plant_of(config, rates)
     faults = [parse_fault(fault) for fault in config.faults]
     sensors = suite_params(config.suite, config.sensors, config.files)
-    calibration_s = config.start.calibration_s if isinstance(config.start, HandThrowStart) else 0.0
+    airborne = isinstance(config.start, InFlightStart)
     flown = fly(
         plant,
         Suite(sensors, rates, config.seed, config.flight, faults, plant.release_s),
@@ -87,8 +90,8 @@ def fly_config(
         pilot,
         script,
         Log.empty(rates.ticks(plant.release_s + config.duration_s)),
-        calibration_s=calibration_s,
-        on_ground=None if calibration_s else sample_at_rest(sensors, rates, config.seed, config.flight),
+        calibration_s=config.calibration_s,
+        on_ground=sample_at_rest(sensors, rates, config.seed, config.flight) if airborne else None,
         manifest={"scenario": scenario.name, "seed": config.seed, "config": config.model_dump(mode="json")},
         watch=watch,
     )
@@ -97,9 +100,29 @@ def fly_config(
     return replace(flown, events=events)
 
 
+def plant_of(config: FlightConfig, rates: Rates) -> Plant:
+    """What flies under a resolved configuration: the aeroplane in its air, or what lies on a table."""
+    start = config.start
+    if isinstance(start, BenchStart):
+        roll_rad, pitch_rad, heading_rad = _radians((start.roll_deg, start.pitch_deg, config.heading_deg))
+        rest = Rest(roll_rad, pitch_rad, heading_rad, start.height_m)
+        return PrescribedPlant(rest, rates, release_s=start.calibration_s)
+    return JsbsimPlant(
+        config.aircraft,
+        start=start_of(config),
+        air=build_air(config.air),
+        rates=rates,
+        seed=config.seed,
+        flight=config.flight,
+        box=FlightBox(config.box_radius_m, config.box_height_m),
+    )
+
+
 def start_of(config: FlightConfig) -> Start:
-    """The plant's start of a resolved configuration."""
+    """Start of the aeroplane of a resolved configuration."""
     start, heading_rad = config.start, math.radians(config.heading_deg)
+    if isinstance(start, BenchStart):
+        raise ValueError("start: on a table nothing starts to fly")
     if not isinstance(start, HandThrowStart):
         north_m, east_m = start.out_m * math.cos(heading_rad), start.out_m * math.sin(heading_rad)
         return InFlight(heading_rad, start.height_m, north_m, east_m, start.airspeed_m_s)
@@ -125,7 +148,8 @@ def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _estimator(config: FlightConfig) -> AttitudeEstimator:
-    """The estimator by name, its parameter dataclass changed where the configuration says so."""
+def estimator_of(config: FlightConfig) -> AttitudeEstimator:
+    """The estimator by name, told what suits its instruments, its parameters changed as the configuration says."""
     estimator = load_estimator(config.estimator)
-    return with_params(estimator, config.estimator, config.estimator_params)
+    params = {**suited(estimator, config.suits), **config.estimator_params}
+    return with_params(estimator, config.estimator, params)

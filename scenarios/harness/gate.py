@@ -20,7 +20,7 @@ from rich.text import Text
 from scenarios.harness import console
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.preflight import prepared
-from scenarios.harness.registry import find, matching, registered
+from scenarios.harness.registry import find, matching
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Outcome
 
@@ -59,13 +59,19 @@ class Task:
 def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, changes: Mapping[str, Any]) -> list[Task]:
     """Every scenario of `names` (all there are, where it is empty) on every seed.
 
-    With an estimator of one's own, "all" leaves out those that pass where their own estimator fails.
+    With an estimator of one's own, those that pass where their own estimator fails are left out, unless named in full.
 
     Raises
     ------
     ValueError      one line: what cannot be flown, before anything is
     """
-    wanted = matching(names) if names else [n for n, s in registered().items() if not (estimator and s.shows_failure)]
+    wanted = matching(names or ["*"])
+    if estimator is not None:
+        left_out = [name for name in wanted if name not in names and find(name).shows_failure]
+        wanted = [name for name in wanted if name not in left_out]
+        if not wanted:
+            raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
+        console.note_left_out(left_out)
     for name in wanted:
         _, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
         console.warn_of_faults(name, config)

@@ -1,17 +1,32 @@
-"""Manoeuvres found in the truth of a flight: turns with their roll-outs, and loops.
+"""Manoeuvres found in the truth of a flight: turns with their roll-outs, loops, rolls, vertical flight, spins.
 
 What a manoeuvre is judged by must not depend on what the estimator believed or on what the script asked for.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.interface import Array
-from scenarios.harness.metrics import Measured, Metric, Moment, SeriesOf, highest, settled_after_s, time_s
+from scenarios.harness.metrics import (
+    NOTHING,
+    Measured,
+    Metric,
+    Moment,
+    Series,
+    SeriesOf,
+    bank_size_deg,
+    highest,
+    lowest,
+    settled_after_s,
+    time_s,
+)
 from sim.log import Flight
+
+Flags = Callable[[Flight], NDArray[np.bool_]]  # of each tick, shape (n,)
 
 
 def bank_rad(flight: Flight) -> Array:
@@ -53,6 +68,22 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last index of every run of True."""
     edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
     return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+
+
+def while_banked(series: SeriesOf, steeper_deg: float) -> SeriesOf:
+    """`series`, judged only where the true bank is at least `steeper_deg` to either side."""
+
+    def banked(flight: Flight) -> Series:
+        whole = series(flight)
+        return replace(whole, judged=whole.judged & (np.abs(np.degrees(bank_rad(flight))) >= steeper_deg))
+
+    return banked
+
+
+def time_banked_s(steeper_deg: float, from_: Moment) -> Metric:
+    """Metric: for how long in all, from `from_` on, the true bank was at least `steeper_deg` to either side, s."""
+    steep = while_banked(bank_size_deg, steeper_deg)
+    return lambda flight: Measured(len(steep(flight).within(from_(flight), math.inf).judged_values) * flight.dt_s)
 
 
 def slowest_recovery(series: SeriesOf, limit: float, turns: int, within_s: float) -> Metric:
@@ -103,3 +134,83 @@ def loops_end_s(loops: int) -> Moment:
 def most_loops(flight: Flight) -> Measured:
     """Metric: how often the nose came round, turns."""
     return Measured(highest(turns_of_pitch(flight)))
+
+
+def most_outside_loops(flight: Flight) -> Measured:
+    """Metric: how often the nose came round the other way, turns."""
+    return Measured(-lowest(turns_of_pitch(flight)))
+
+
+def turned(axis: str, sense: float) -> Metric:
+    """Metric: the most that it turned about its own `axis`, x, y or z, in the sense +1 or -1, turns.
+
+    The integral of the body rate, from its lowest point to the highest that follows: what was turned back counts off.
+    """
+    i = "xyz".index(axis)
+
+    def metric(flight: Flight) -> Measured:
+        angle = sense * np.cumsum(flight.log.truth["imu_omega_b_rad_s"][:, i]) * flight.dt_s
+        if not len(angle):
+            return NOTHING
+        return Measured(float(np.max(angle - np.minimum.accumulate(angle))) / (2.0 * np.pi))
+
+    return metric
+
+
+def inverted(flight: Flight) -> NDArray[np.bool_]:
+    """Flags: upside down, ``r_zz`` below -0.8, within 37 degrees of it."""
+    return np.asarray(flight.log.truth["R_eb"][:, 2, 2] < -0.8)
+
+
+def vertical(flight: Flight) -> NDArray[np.bool_]:
+    """Flags: the nose within 15 degrees of straight up."""
+    return np.asarray(-flight.log.truth["R_eb"][:, 2, 0] > math.sin(math.radians(75.0)))
+
+
+def spinning(flight: Flight) -> NDArray[np.bool_]:
+    """Flags: the wing well stalled, and roll and yaw of one sense, each faster than 45 deg/s: autorotation."""
+    truth, least_rad_s = flight.log.truth, math.radians(45.0)
+    roll, yaw = truth["imu_omega_b_rad_s"][:, 0], truth["imu_omega_b_rad_s"][:, 2]
+    fast = (np.minimum(np.abs(roll), np.abs(yaw)) > least_rad_s) & (roll * yaw > 0.0)
+    return np.asarray(fast & (truth["alpha_rad"] > math.radians(15.0)))
+
+
+def total_s(flags: Flags) -> Metric:
+    """Metric: how long `flags` were true, s."""
+    return lambda flight: Measured(float(np.count_nonzero(flags(flight))) * flight.dt_s)
+
+
+def longest_s(flags: Flags) -> Metric:
+    """Metric: how long `flags` were true without a break, at most, s."""
+    return lambda flight: Measured(max((b - a + 1 for a, b in _runs(flags(flight))), default=0) * flight.dt_s)
+
+
+def last(flags: Flags) -> Moment:
+    """The last moment at which `flags` were true; NaN where they never were."""
+
+    def moment(flight: Flight) -> float:
+        true = np.flatnonzero(flags(flight))
+        return float(time_s(flight)[true[-1]]) if len(true) else math.nan
+
+    return moment
+
+
+def spun_turns(flight: Flight) -> Measured:
+    """Metric: turns about the vertical while `spinning`; the rate is the third row times the gyro vector."""
+    truth = flight.log.truth
+    rate = np.sum(truth["R_eb"][:, 2] * truth["imu_omega_b_rad_s"], axis=1)
+    return Measured(float(abs(np.sum(rate[spinning(flight)]))) * flight.dt_s / (2.0 * np.pi))
+
+
+def course_turned(flags: Flags) -> Metric:
+    """Metric: how far the true course over the ground turned to the right between the first and last flag, turns."""
+
+    def metric(flight: Flight) -> Measured:
+        true = np.flatnonzero(flags(flight))
+        if not len(true):
+            return NOTHING
+        v_e = flight.log.truth["v_e_m_s"]
+        course = np.unwrap(np.arctan2(v_e[:, 1], v_e[:, 0]))
+        return Measured(float(course[true[-1]] - course[true[0]]) / (2.0 * np.pi))
+
+    return metric

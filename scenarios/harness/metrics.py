@@ -5,8 +5,8 @@ A metric turns a flight into one value with the number of samples it rests on an
 holds; a flight that ended early, or a window in which nothing could be judged, shows in those two numbers.
 
 Attitude error is the angle of ``R_est @ R_true.T``, beside it its two parts: inclination, the angle between the
-two ``r_z`` rows, and heading, ``atan2(r_yx, r_xx)``.  Heading means nothing near the vertical or standing still,
-and is judged where ``|r_zx| < 0.9`` and the ground speed is above 3 m/s.
+two ``r_z`` rows, and heading, ``atan2(r_yx, r_xx)``.  Heading means nothing near the vertical, nor in the air standing
+still, and is judged where ``|r_zx| < 0.9`` and the ground speed is above 3 m/s; that of a nose on a table, too.
 """
 
 import math
@@ -25,6 +25,7 @@ from sim.log import Flight, Outcome, Phase
 
 STEEPEST_R_ZX = 0.9  # sine of the pitch beyond which heading is not judged
 SLOWEST_M_S = 3.0  # ground speed below which there is no course
+_ROUND_OFF_S = 1e-6  # of times; ticks lie at least milliseconds apart
 
 
 class Measured(NamedTuple):
@@ -68,8 +69,7 @@ SeriesOf = Callable[[Flight], Series]
 
 
 def _inside(t_s: Array, from_s: float, to_s: float) -> NDArray[np.bool_]:
-    margin_s = 1e-6  # ticks lie at least milliseconds apart: only round-off is forgiven
-    return (t_s > from_s + margin_s) & (t_s <= to_s + margin_s)
+    return (t_s > from_s + _ROUND_OFF_S) & (t_s <= to_s + _ROUND_OFF_S)
 
 
 def time_s(flight: Flight) -> Array:
@@ -83,8 +83,9 @@ def planned_end_s(flight: Flight) -> float:
 
 
 def _series(flight: Flight, value: Array, judged: NDArray[np.bool_] | None = None) -> Series:
-    flying = flight.log.truth["phase"] == Phase.FLYING
-    return Series(time_s(flight), value, flying if judged is None else flying & judged)
+    t_s = time_s(flight)
+    let_go = (flight.log.truth["phase"] >= Phase.FLYING) & (t_s > _ROUND_OFF_S)
+    return Series(t_s, value, let_go if judged is None else let_go & judged)
 
 
 def inclination_error_deg(flight: Flight) -> Series:
@@ -108,12 +109,15 @@ def heading_error_deg(against: HeadingReference | None = None) -> SeriesOf:
     def series(flight: Flight) -> Series:
         truth, R_est = flight.log.truth, flight.log.flown["R_eb"]
         R_true, v_e = truth["R_eb"], truth["v_e_m_s"]
-        if (against or flight.heading_reference) == "course":
+        judged_against = against or flight.heading_reference
+        if judged_against == "course":
             error = wrap(heading_rad(R_est) - np.arctan2(v_e[:, 1], v_e[:, 0]))
         else:
             error = heading_error_rad(R_est, R_true)
-        judged = np.abs(R_true[:, 2, 0]) < STEEPEST_R_ZX
-        judged &= np.hypot(v_e[:, 0], v_e[:, 1]) > SLOWEST_M_S
+        judged = np.hypot(v_e[:, 0], v_e[:, 1]) > SLOWEST_M_S
+        if judged_against == "nose":
+            judged |= truth["phase"] == Phase.RESTING
+        judged &= np.abs(R_true[:, 2, 0]) < STEEPEST_R_ZX
         return _series(flight, np.degrees(np.abs(error)), judged)
 
     return series
@@ -172,6 +176,15 @@ def bank_size_deg(flight: Flight) -> Series:
     return _series(flight, np.degrees(np.abs(np.arctan2(R[:, 2, 1], R[:, 2, 2]))))
 
 
+def believed_pitch_deg(flight: Flight) -> Series:
+    """Estimated pitch angle, degrees."""
+    return _series(flight, _pitch_deg(flight.log.flown["R_eb"]))
+
+
+def _pitch_deg(R_eb: Array) -> Array:
+    return np.degrees(np.arcsin(np.clip(-R_eb[:, 2, 0], -1.0, 1.0)))
+
+
 def angle_of_attack_deg(flight: Flight) -> Series:
     """True angle of attack, degrees."""
     return _series(flight, np.degrees(flight.log.truth["alpha_rad"]))
@@ -185,6 +198,11 @@ def start(flight: Flight) -> float:  # noqa: ARG001 - a Moment like any other
 def end(flight: Flight) -> float:
     """The planned end of the flight."""
     return planned_end_s(flight)
+
+
+def last(flight: Flight) -> float:
+    """The last tick that was flown, planned or not."""
+    return float(time_s(flight)[-1]) if len(flight.log) else math.nan
 
 
 def at(t_s: float) -> Moment:
@@ -277,6 +295,18 @@ def settling(series: SeriesOf, limit: float, from_: Moment = start, to: Moment =
 def survived(flight: Flight) -> Measured:
     """Metric: 1 where the flight lasted as long as planned, 0 where it ended in any other way."""
     return Measured(float(flight.outcome == Outcome.COMPLETED))
+
+
+def ground_contact_s(flight: Flight) -> Measured:
+    """Metric: when it hit the ground, s after the release; nothing where it did not."""
+    return Measured(last(flight)) if flight.outcome == Outcome.GROUND_CONTACT else NOTHING
+
+
+def pitch_at_ground_deg(flight: Flight) -> Measured:
+    """Metric: true pitch as it hit the ground, degrees; nothing where it did not."""
+    if flight.outcome != Outcome.GROUND_CONTACT or not len(flight.log):
+        return NOTHING
+    return Measured(float(_pitch_deg(flight.log.truth["R_eb"])[-1]))
 
 
 def height_at_m(t_s: float) -> Metric:

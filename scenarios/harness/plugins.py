@@ -99,6 +99,12 @@ def with_params(estimator: "AttitudeEstimator", spec: str, values: Mapping[str, 
         raise ValueError(f"estimator {spec!r}: its class must take its params as an argument: {error}") from error
 
 
+def suited(estimator: object, suits: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of `suits`, what is known of the instruments aboard, that `estimator` has parameters for."""
+    params = getattr(estimator, "params", None)
+    return {name: value for name, value in suits.items() if hasattr(params, name)}
+
+
 def heading_reference_of(estimator: object) -> "HeadingReference":
     """What the heading of `estimator` converges to; the course where it does not say."""
     reference: HeadingReference = getattr(estimator, "heading_reference", "course")

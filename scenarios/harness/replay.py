@@ -24,7 +24,7 @@ from scenarios.harness import console
 from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import heading_reference_of, load_estimator, with_params
+from scenarios.harness.plugins import heading_reference_of, load_estimator, suited, with_params
 from sim.acceptance import FlightCodeFailed, estimate_of
 from sim.events import events_of
 from sim.log import Event, Flight, Log, Outcome, Phase
@@ -109,14 +109,6 @@ def make(spec: str, params: Mapping[str, Any]) -> AttitudeEstimator:
     return with_params(estimator, spec, values)
 
 
-def suited(spec: str, suits: Mapping[str, Any]) -> dict[str, Any]:
-    """Those of a log's `suits` that the estimator `spec` has parameters for."""
-    if not suits:
-        return {}
-    params = getattr(load_estimator(spec), "params", None)
-    return {name: value for name, value in suits.items() if hasattr(params, name)}
-
-
 def replay(
     log: RecordedLog,
     spec: str,
@@ -133,7 +125,7 @@ def replay(
     ValueError      one line: no such estimator or parameter, or a calibration longer than the log
     """
     window = window or Window()
-    estimator = make(spec, {**suited(spec, log.suits), **(params or {})})
+    estimator = make(spec, {**suited(load_estimator(spec), log.suits), **(params or {})})
     n = _calibration(log, window)
     on_ground = at_rest(log.rows[:n]) if n else None
     first = n if on_ground is not None else 0

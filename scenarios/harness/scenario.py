@@ -23,7 +23,7 @@ class Scenario:
     checks      what it must pass
     milestones  moments found in the truth of the flight, by what to call them; they become events
     shows_failure   it passes where its own estimator fails as the paper says, and for no estimator that copes:
-                where all scenarios are flown with an estimator of one's own, this one is left out
+                it is left out where an estimator of one's own flies all scenarios, or a family of them
     """
 
     name: str

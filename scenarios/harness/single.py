@@ -87,6 +87,9 @@ def tell(flown: Flown) -> None:
     out.print(
         Text(f"{ended}: {flight.message}" if flight.message else ended, "" if planned else "bold red"), soft_wrap=True
     )
+    for event in flight.events:
+        if event.level == "warn":
+            out.print(Text(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow"), soft_wrap=True)
     out.print(Text(f"recording   {flown.folder}\nto see it   wingslevel view {flown.folder}"), soft_wrap=True)
 
 

@@ -24,7 +24,7 @@ _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at lea
            "less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}  # fmt: skip
 _WHOLE = ("int_parsing", "int_type", "int_from_float")
 # Branches of unions that pydantic puts into the place of an error; they are no part of a field's name.
-_BRANCHES = ("in_flight", "hand_throw", "float", "constrained-float", "HandMotion")
+_BRANCHES = ("in_flight", "hand_throw", "bench", "float", "constrained-float", "HandMotion")
 
 
 def unit_of(name: str) -> str:

@@ -95,14 +95,14 @@ class Verdict:
                 {
                     "scenario": v.scenario, "estimator": v.estimator, "seed": v.seed, "flight": v.flight,
                     "outcome": str(v.outcome), "message": v.message, "passed": v.passed,
-                    "checks": [_plain(row) for row in v.rows], "metrics": v.metrics,
+                    "checks": [plain(row) for row in v.rows], "metrics": v.metrics,
                 }
                 for v in self.flights
             ],
             "pooled": [
                 {
                     "scenario": v.scenario, "estimator": v.estimator, "n_flights": v.n_flights,
-                    "passed": v.passed, "checks": [_plain(row) for row in v.rows],
+                    "passed": v.passed, "checks": [plain(row) for row in v.rows],
                 }
                 for v in self.pooled
             ],
@@ -156,7 +156,8 @@ def _counted(n: int) -> str:
     return f"{n} flight" if n == 1 else f"{n} flights"
 
 
-def _plain(row: Row) -> dict[str, Any]:
+def plain(row: Row) -> dict[str, Any]:
+    """A line as plain data for JSON; what could not be measured is None."""
     measured = row.measured if math.isfinite(row.measured) else None
     plain = {"name": row.name, "unit": row.unit, "measured": measured, "sense": row.sense, "limit": row.limit,
              "passed": row.passed}  # fmt: skip

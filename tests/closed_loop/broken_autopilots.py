@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from autopilot.airframes import params_of
 from autopilot.autopilot import DcmAutopilot
+from autopilot.interface import ActuatorCommand, Setpoint
 from estimator.interface import HeadingReference
 
 
@@ -23,3 +24,44 @@ class NeverMissesTheGps(DcmAutopilot):
         params = params_of(aircraft)
         patient = replace(params, failsafe=replace(params.failsafe, gps_lost_s=1e9))
         super().__init__(patient, heading_reference, aircraft)
+
+
+class _Mishears(DcmAutopilot):
+    """Flies each set-point as `heard` has it."""
+
+    def __init__(self, *arguments, **named):
+        super().__init__(*arguments, **named)
+        self._heard = {}
+
+    def update(self, estimate, m, setpoint):
+        """As the sound one, which looks at a set-point only where it is another object than before."""
+        if setpoint not in self._heard:
+            self._heard[setpoint] = self.heard(setpoint)
+        return super().update(estimate, m, self._heard[setpoint])
+
+
+class NeverInverted(_Mishears):
+    """Stays upright whatever is asked."""
+
+    @staticmethod
+    def heard(setpoint: Setpoint) -> Setpoint:
+        """Right side up."""
+        return replace(setpoint, inverted=False)
+
+
+class HalfTheRate(_Mishears):
+    """Rotates half as fast as it is asked to."""
+
+    @staticmethod
+    def heard(setpoint: Setpoint) -> Setpoint:
+        """Half of each rate."""
+        p, q, r = setpoint.rate_b_rad_s
+        return replace(setpoint, rate_b_rad_s=(0.5 * p, 0.5 * q, 0.5 * r))
+
+
+class RudderStuck(DcmAutopilot):
+    """The rudder stays in line."""
+
+    def update(self, estimate, m, setpoint) -> ActuatorCommand:
+        """As the sound one, but for the rudder."""
+        return super().update(estimate, m, setpoint)._replace(rudder=0.0)

@@ -109,12 +109,12 @@ def without_level(monkeypatch):
 
 @pytest.mark.parametrize("mode", [Mode.COURSE, Mode.STABILISE])
 def test_unhealthy_estimator_stays_aloft_for_a_minute_with_wings_level(mode):
-    """On gyros alone from the last healthy attitude on: the bank drifts, and stays below 20 degrees."""
+    """On gyros alone from the last healthy attitude on: the bank drifts, and stays below 20 degrees (14 measured)."""
     flight = flown([(0.0, replace(AHEAD, mode=mode))], 140.0, estimator=FallsIll())
     assert flight.outcome == Outcome.COMPLETED
     assert modes(flight) == [mode, Mode.LEVEL]
     assert abs(bank_deg(flight)[3300:]).max() < 20.0
-    assert heights_m(flight).min() > 40.0
+    assert heights_m(flight).min() > 80.0
     assert "mode level: estimator unhealthy" in {e.text for e in flight.events}
 
 
@@ -150,10 +150,11 @@ def test_low_sailplane_lands_straight():
 
 @pytest.mark.parametrize(("radius_m", "left"), [(60.0, False), (100.0, True)])
 def test_loiter_in_wind_and_turbulence_keeps_the_circle(radius_m, left):
-    """4 m/s of wind, sensors with their noise, the default estimator: within 15 m of the circle for a minute."""
+    """4 m/s of wind, sensors with their noise, the default estimator: within 20 m of the circle (14 measured,
+    10 on the true attitude), and 12 m of the height."""
     setpoint = Setpoint(Mode.LOITER, north_m=100.0, east_m=50.0, radius_m=radius_m, left=left, height_m=100.0)
     flight = flown([(0.0, setpoint)], 120.0)
     assert flight.outcome == Outcome.COMPLETED
     p = flight.log.truth["p_e_m"][3000:]
-    np.testing.assert_allclose(np.hypot(p[:, 0] - 100.0, p[:, 1] - 50.0), radius_m, rtol=0, atol=15.0)
+    np.testing.assert_allclose(np.hypot(p[:, 0] - 100.0, p[:, 1] - 50.0), radius_m, rtol=0, atol=20.0)
     np.testing.assert_allclose(heights_m(flight)[3000:], 100.0, rtol=0, atol=12.0)

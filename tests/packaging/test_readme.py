@@ -17,7 +17,7 @@ from scenarios.harness.registry import find
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-DOCUMENTS = ("README.md", "CONTRIBUTING.md", "docs/recording.md", "docs/replay.md", "docs/reports.md")
+DOCUMENTS = ("README.md", "CONTRIBUTING.md", "docs/recording.md", "docs/claims.md", "docs/replay.md", "docs/reports.md")
 
 # Commands that are shown and not run here, each with the reason.
 NOT_RUN = {
@@ -26,6 +26,8 @@ NOT_RUN = {
     r"wingslevel view": "opens a window; refused without a display, see test_view_command_of_the_readme",
     r"wingslevel export .*": "needs a flight, see test_export_command_of_the_readme",
     r"wingslevel fly hand_launch --live": "opens a window",
+    r"wingslevel claims": "minutes of flights; the next line of the README measures one",
+    r"wingslevel claims --markdown docs/claims.md": "the same; tests/unit/test_claims.py compares the page",
     r"wingslevel replay .*": "needs a log of one's own; tests/unit/test_cli_replay.py writes some",
     r"wingslevel check --seeds 0-9 .*": "fifty flights, which tests/closed_loop flies; its options are run below",
 }  # fmt: skip

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from autopilot.airframes import params_of
 from autopilot.autopilot import DcmAutopilot
 from autopilot.interface import Mode, Setpoint
-from autopilot.pilot import Script, inside_loops
+from autopilot.manoeuvres import inside_loops
+from autopilot.pilot import Script
 from sim.air import STILL, Air
 from sim.clock import Rates
 from sim.jsbsim_plant import JsbsimPlant

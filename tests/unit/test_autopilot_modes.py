@@ -14,7 +14,7 @@ from autopilot.autopilot import _PARAMS, DcmAutopilot
 from autopilot.energy import EnergyParams
 from autopilot.interface import Mode, Setpoint
 from autopilot.mixer import MixerParams, mix
-from autopilot.pilot import Script, Timed, inside_loops, reversals
+from autopilot.pilot import Script, Timed, reversals
 from autopilot.stabilise import StabiliseParams
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
 
@@ -232,20 +232,6 @@ def test_script_without_order_is_refused(times):
     """No set-point, equal times, decreasing times, no time."""
     with pytest.raises(ValueError, match=r"^Script: "):
         Script([(t, Setpoint(Mode.RETURN)) for t in times])
-
-
-def test_inside_loops_end_when_the_pitch_rate_has_turned_them():
-    """Three loops at 90 deg/s are twelve seconds after the run-in."""
-    after = Setpoint(Mode.COURSE)
-    loops = inside_loops(10.0, 3, after, pitch_rate_rad_s=math.pi / 2, run_in_s=3.0)
-    script = Script(loops.timed)
-    assert loops.ends_s == pytest.approx(25.0, rel=0, abs=1e-12)
-    assert script.at(12.9).mode == Mode.STABILISE
-    assert script.at(13.1).rate_b_rad_s == (0.0, math.pi / 2, 0.0)
-    assert script.at(24.9).throttle == 1.0
-    assert script.at(25.1) is after
-    with pytest.raises(ValueError, match="inside_loops: count 0"):
-        inside_loops(0.0, 0, after)
 
 
 def test_reversals_alternate_between_the_course_and_its_opposite():

@@ -222,3 +222,39 @@ def test_bench_json_names_every_figure_with_its_unit(capfd) -> None:
     assert min(data["estimator_ns_per_call"], data["estimator_update_ns"]) > 0.0
     assert set(data["stages_us_per_tick"]) == set(STAGES)
     assert min(data["stages_us_per_tick"].values()) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("names", "left_out"),
+    [
+        ([], True),
+        (["gps_latency*"], True),
+        (["gps_latency"], False),
+        (["gps_lat*", "gps_latency", "gps_latency_s_3"], False),
+    ],
+)
+def test_check_with_ones_own_estimator_says_what_it_leaves_out(names: list[str], left_out: bool, capfd) -> None:
+    """Those that pass where their own estimator fails, in one line of standard error, unless named in full."""
+    flown = {task.scenario for task in gate.tasks(names, [0], "gyro_only", {})}
+    lines = [line for line in capfd.readouterr().err.splitlines() if "left out" in line]
+    assert ("gps_latency" not in flown) == left_out
+    assert ("gps_latency_s_3" not in flown) == (left_out or "gps_latency_s_3" not in names)
+    assert "gps_latency_told_3" in flown or "gps_latency*" not in names
+    assert len(lines) == left_out
+    assert all("gps_latency, gps_latency_s_3" in line for line in lines)
+
+
+def test_check_of_nothing_but_failures_to_show_is_refused(capfd) -> None:
+    """A gate that flies nothing would pass."""
+    assert run(["check", "hand_launch_accel*", "--seeds", "0", "--estimator", "gyro_only"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "hand_launch_accelerometer" in line
+    assert "name it in full" in line
+
+
+def test_check_of_a_pattern_flies_the_family() -> None:
+    """Whatever the scenario's own estimator, where none is named."""
+    flown = [task.scenario for task in gate.tasks(["turns_180*", "turns_180"], [0, 1], None, {})]
+    assert flown[::2] == ["turns_180", "turns_180_bank_30", "turns_180_bank_45", "turns_180_bank_60"]
+    assert flown[::2] == flown[1::2]
+    assert {task.scenario for task in gate.tasks(["hand_launch*"], [0], None, {})} >= {"hand_launch_accelerometer"}

@@ -18,6 +18,7 @@ from scenarios.harness.config import (
     resolve,
 )
 from scenarios.harness.fitted import suite_params
+from scenarios.harness.flight import estimator_of
 from sim.clock import Rates
 from sim.params import changed
 from sim.sensors.suite import SUITES
@@ -33,6 +34,8 @@ CROSS = FlightConfig(air=AirConfig(wind_m_s=5.0, wind_from_deg="cross"), manoeuv
         (" 2.5@0 ", Wind(2.5, 0.0)),
         ("5@random", Wind(5.0, "random")),
         ("5@CROSS", Wind(5.0, "cross")),
+        ("5@head", Wind(5.0, "head")),
+        ("5@tail", Wind(5.0, "tail")),
         ("0", Wind(0.0, 0.0)),
         ("calm", Wind(0.0, 0.0)),
     ],
@@ -158,6 +161,17 @@ def test_resolve_of_cross_wind_is_square_to_the_heading_from_both_sides():
     assert sides == {90.0, 270.0}
 
 
+@pytest.mark.parametrize(("word", "beside_deg"), [("head", 0.0), ("tail", 180.0)])
+def test_resolve_of_head_and_tail_wind_is_along_the_heading(word, beside_deg):
+    """Wherever the nose points by chance: a head wind comes from there, a tail wind from behind."""
+    for seed in range(5):
+        config = resolve(override(THROW, {"wind": f"5@{word}", "seed": seed}))
+        beside = (config.air.wind_from_deg - config.heading_deg - beside_deg + 180.0) % 360.0 - 180.0
+        assert beside == pytest.approx(0.0, rel=0, abs=1e-9)
+        assert 0.0 <= config.air.wind_from_deg < 360.0
+        assert resolve(config) == config
+
+
 def test_resolve_draws_headings_and_winds_uniformly_and_apart():
     """Kolmogorov-Smirnov against uniform over 300 seeds at the 0.1 % level, and no correlation beyond 3.3 sigma."""
     drawn = np.array(
@@ -211,3 +225,15 @@ def test_heading_before_it_is_drawn_is_refused():
     """Nobody reads a random heading by mistake."""
     with pytest.raises(ValueError, match="resolve the configuration first"):
         _ = FlightConfig(start=InFlightStart()).heading_deg
+
+
+def test_what_suits_the_instruments_is_told_to_whoever_has_a_parameter_for_it():
+    """And to nobody else; a parameter that is set by name is stronger."""
+    config = override(CROSS, {"suits.gps_latency_s": "3", "duration_s": "0.1"})
+    assert config.suits == {"gps_latency_s": 3.0}
+    assert estimator_of(config).params.gps_latency_s == 3.0
+    assert estimator_of(override(config, {"estimator": "ins_ekf"})).params.gps_latency_s == 3.0
+    assert estimator_of(override(config, {"estimator_params.gps_latency_s": 1.0})).params.gps_latency_s == 1.0
+    assert not hasattr(estimator_of(override(config, {"estimator": "gyro_only"})), "params")
+    with pytest.raises(ValueError, match=r"suits.gps_latency_s = 'soon'"):
+        override(CROSS, {"suits.gps_latency_s": "soon"})

@@ -107,6 +107,14 @@ def test_replay_takes_what_the_log_says_of_its_instruments(flights):
     assert not replay(knows, "gyro_only").failure
 
 
+def test_replay_of_our_recording_tells_what_the_flight_was_told(tmp_path):
+    """A receiver known to be 3 s late in flight is known to be in replay."""
+    recording.save(fly_scenario(find("gps_latency_told_3"), {"duration_s": 1.0}), tmp_path / "late")
+    log = logs.read(tmp_path / "late")
+    assert log.suits == {"gps_latency_s": 3.0}
+    assert replay(log, "premerlani").scores == replay(log, "premerlani", {"gps_latency_s": 3.0}).scores
+
+
 def test_replay_of_an_estimator_that_fails_says_so_and_is_recorded(flights, tmp_path):
     """No scores, one line with class, time and fault, and a recording that says it too."""
     _, log = flights[AIR]

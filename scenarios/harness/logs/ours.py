@@ -32,4 +32,5 @@ def read(path: Path) -> RecordedLog:
         float(setting(flight.manifest, "launch_longitude_deg", LONGITUDE_DEG)),
     )
     name = path.name if path.is_dir() else path.parent.name
-    return RecordedLog(rows, name or path.name, instruments, reference, (), place)
+    suits = flight.manifest.get("config", {}).get("suits", {})
+    return RecordedLog(rows, name or path.name, instruments, reference, (), place, suits)

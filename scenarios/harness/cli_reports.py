@@ -1,0 +1,78 @@
+"""What every command does alike: refuse in one line what it cannot do, and write its reports, whole or not at all."""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import typer
+
+
+@contextmanager
+def usage() -> Iterator[None]:
+    """What is refused inside the block is the user's to mend: one line, exit code 2."""
+    try:
+        yield
+    except ValueError as problem:
+        raise refusal(str(problem)) from problem
+
+
+def refusal(message: str) -> typer.TyperException:
+    """What ends a command with `message` as its one line and exit code 2: to be raised."""
+    return typer.TyperException(message)
+
+
+@contextmanager
+def reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
+    """Gives what writes the JSON.  Where that goes to standard output, everything else goes to standard error."""
+    if target == "-":
+        stdout = sys.stdout
+        with redirect_stdout(sys.stderr):
+            yield lambda data: print(_text(data), file=stdout)
+    else:
+        path = Path(target) if target is not None else None
+        with usage():
+            check_file(path)
+        yield lambda data: write(path, lambda: _text(data) + "\n")
+
+
+def _text(data: Any) -> str:
+    return json.dumps(data, indent=2, allow_nan=False)
+
+
+def check_file(path: Path | None) -> None:
+    """Refuse, before flying, a report that could not be written."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise refusal(f"cannot write to {path}: it is a folder")
+    if not path.parent.is_dir():
+        raise refusal(f"cannot write to {path}: there is no folder {path.parent}")
+    # A file is replaced, which its folder must allow; a device or a pipe is written to.
+    target = path.resolve()
+    if not os.access(target if _is_stream(target) else target.parent, os.W_OK):
+        raise refusal(f"cannot write to {path}: permission denied")
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether `path` is there, and is neither a file nor a folder: /dev/stdout, a pipe."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
+    """Write a report, complete or not at all."""
+    if path is None:
+        return
+    from sim.recording import replacing
+
+    made = content()
+    data = made.encode("utf-8") if isinstance(made, str) else made
+    target = path.resolve()  # what a link points to is replaced, not the link
+    if _is_stream(target):
+        target.write_bytes(data)
+        return
+    with usage(), replacing(target) as temporary:
+        temporary.write_bytes(data)
