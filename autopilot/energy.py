@@ -41,13 +41,14 @@ class EnergyParams:
     headwind_found_s, headwind_lost_s : time constants of the headwind believed, growing and shrinking
     climb_per_height_1_s, climb_limit_m_s, sink_limit_m_s : climb demanded per height missing, and its limits
     gain_per_speed_1_s, gain_limit_m_s2 : acceleration demanded per airspeed missing, and its limit
-    height_weight : 1 - w: 0 where the pitch is the speed's        climb_per_margin_1_s : climb allowed per airspeed
-        above `least_airspeed`
+    height_weight : 1 - w: 0 where the pitch is the speed's
+    recovery_sink_m_s, climb_per_margin_1_s : sink demanded at `least_airspeed`, and climb allowed per speed above
     pitch_trim_rad : pitch of level flight at cruise       pitch_limit_rad : the steepest demanded
     pitch_per_lift_rad : more of it per lift coefficient, in units of that at cruise
     pitch_per_climb_rad_m, pitch_integral_limit_rad : integral of the climb missing, and the most it holds
     throttle_trim, throttle_per_speed_s_m, throttle_inverted : for level flight at cruise, faster, on its back
-    throttle_per_climb_s_m, throttle_per_height_1_m : per rate of energy, and the integral
+    throttle_per_climb_s_m, throttle_per_height_1_m : per rate of energy, and its integral
+    throttle_integral_limit : the most it holds
     throttle_least : keeps air over the tail
     """
 
@@ -67,7 +68,8 @@ class EnergyParams:
     gain_per_speed_1_s: float = 0.3
     gain_limit_m_s2: float = 1.5
     height_weight: float = 0.5
-    climb_per_margin_1_s: float = 1.0
+    climb_per_margin_1_s: float = 3.0
+    recovery_sink_m_s: float = 1.0
     pitch_trim_rad: float = math.radians(1.0)
     pitch_limit_rad: float = math.radians(15.0)
     pitch_per_lift_rad: float = math.radians(4.6)
@@ -78,6 +80,7 @@ class EnergyParams:
     throttle_inverted: float = 0.08
     throttle_per_climb_s_m: float = 0.085
     throttle_per_height_1_m: float = 0.01
+    throttle_integral_limit: float = 0.2
     throttle_least: float = 0.1
 
 
@@ -214,39 +217,38 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     e = p.energy
     trim_rad, trim = level_flight(s, e)
     missing_m = height_m - height(row, p.guidance)
-    height_known = math.isfinite(missing_m)
-    climb_m_s, gain_m_s, most_m_s = 0.0, 0.0, math.inf
-    if height_known:
+    climb_m_s = sinking_m_s = 0.0
+    if math.isfinite(missing_m):
         climb_m_s = clip(e.climb_per_height_1_s * missing_m, -e.sink_limit_m_s, e.climb_limit_m_s)
+        sinking_m_s = row.gps_v_e_m_s[2]  # the velocity is down
+    gain_m_s, most_m_s = 0.0, math.inf
     if s.airspeed_known:
         gain_m_s2 = e.gain_per_speed_1_s * (s.airspeed_wanted_m_s - s.airspeed_m_s)
         gain_m_s = s.airspeed_m_s / G_M_S2 * clip(gain_m_s2, -e.gain_limit_m_s2, e.gain_limit_m_s2)
-        most_m_s = e.climb_per_margin_1_s * (s.airspeed_m_s - least_airspeed(s, e))
-    wanted_m_s = climb_m_s + gain_m_s
-    throttle, given_m_s = throttle_of(wanted_m_s, trim, s, e)
-    climb_m_s = e.height_weight * climb_m_s + (1.0 - e.height_weight) * (given_m_s - gain_m_s)
-    climb_m_s = min(climb_m_s, most_m_s)
-    learn_trim(climb_m_s, wanted_m_s, given_m_s, gain_m_s, height_known, row, s, e, dt_s)
+        most_m_s = e.climb_per_margin_1_s * (s.airspeed_m_s - least_airspeed(s, e)) - e.recovery_sink_m_s
+    energy_m_s = climb_m_s + gain_m_s
+    throttle, given_m_s = throttle_of(energy_m_s, trim, s, e)
+    climb_m_s = min(e.height_weight * climb_m_s + (1.0 - e.height_weight) * (given_m_s - gain_m_s), most_m_s)
     pitch_rad = trim_rad + climb_m_s / s.airspeed_wanted_m_s + s.climb_integral_rad
+
+    if e.height_weight > 0.0:  # else the climb is what the speed makes it
+        climb_missing_m_s = climb_m_s + sinking_m_s if math.isfinite(missing_m) else 0.0
+    else:
+        climb_missing_m_s = climb_m_s
+    if climb_m_s == most_m_s:  # too slow: what is missing is not lift
+        climb_missing_m_s = min(climb_missing_m_s, 0.0)
+    learns = s.airspeed_known and math.isfinite(missing_m) and abs(given_m_s - energy_m_s) < 1e-6
+    learn_trim(climb_missing_m_s, energy_m_s + sinking_m_s if learns else 0.0, s, e, dt_s)
     return clip(pitch_rad, -e.pitch_limit_rad, e.pitch_limit_rad), throttle
 
 
 @kernel
-def learn_trim(climb_m_s, wanted_m_s, given_m_s, gain_m_s, height_known, row, s, e, dt_s):  # type: ignore[no-untyped-def]
-    """One tick of the integrals of pitch and throttle; that of the throttle waits while the throttle is at its stop.
-
-    climb_m_s : demanded of the pitch   wanted_m_s, given_m_s : rate of energy   gain_m_s : the part of it for speed
-    """
-    missing_m_s = 0.0
-    if e.height_weight <= 0.0:
-        missing_m_s = -gain_m_s
-    elif height_known:
-        missing_m_s = clip(climb_m_s + row.gps_v_e_m_s[2], -5.0, 5.0)  # the velocity is down
-    integral_rad = s.climb_integral_rad + e.pitch_per_climb_rad_m * missing_m_s * dt_s
+def learn_trim(climb_missing_m_s, energy_missing_m_s, s, e, dt_s):  # type: ignore[no-untyped-def]
+    """One tick of the integrals of pitch and throttle; the caller hands 0 to the one that is to wait."""
+    integral_rad = s.climb_integral_rad + e.pitch_per_climb_rad_m * clip(climb_missing_m_s, -5.0, 5.0) * dt_s
     s.climb_integral_rad = clip(integral_rad, -e.pitch_integral_limit_rad, e.pitch_integral_limit_rad)
-    if s.airspeed_known and height_known and given_m_s == wanted_m_s:
-        integral = s.throttle_integral + e.throttle_per_height_1_m * wanted_m_s * dt_s
-        s.throttle_integral = clip(integral, -0.3, 0.3)
+    integral = s.throttle_integral + e.throttle_per_height_1_m * energy_missing_m_s * dt_s
+    s.throttle_integral = clip(integral, -e.throttle_integral_limit, e.throttle_integral_limit)
 
 
 @kernel
