@@ -17,7 +17,10 @@ from scenarios.harness.registry import find
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-DOCUMENTS = ("README.md", "CONTRIBUTING.md", "docs/recording.md", "docs/claims.md", "docs/replay.md", "docs/reports.md")
+DOCUMENTS = (
+    "README.md", "CONTRIBUTING.md", "docs/autopilot.md", "docs/claims.md", "docs/recording.md", "docs/replay.md",
+    "docs/reports.md",
+)  # fmt: skip
 
 # Commands that are shown and not run here, each with the reason.
 NOT_RUN = {
@@ -49,10 +52,11 @@ RUN = [command for command in commands() if not any(re.fullmatch(pattern, comman
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch) -> Path:
-    """A working directory with the estimator of the README in `my_filter.py`."""
+    """A working directory with the estimator, the scenario and the autopilot that the documents show, as files."""
     monkeypatch.chdir(tmp_path)
-    (source,) = blocks("python")
-    (tmp_path / "my_filter.py").write_text(source, encoding="utf-8")
+    shown = (*blocks("python"), *blocks("python", "docs/autopilot.md"))
+    for name, source in zip(("my_filter.py", "my_route.py", "my_autopilot.py"), shown, strict=True):
+        (tmp_path / name).write_text(source, encoding="utf-8")
     return tmp_path
 
 
