@@ -65,16 +65,16 @@ def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, cha
     ------
     ValueError      one line: what cannot be flown, before anything is
     """
-    wanted = matching(names or ["*"])
+    wanted, left_out = matching(names or ["*"]), []
     if estimator is not None:
         left_out = [name for name in wanted if name not in names and find(name).shows_failure]
         wanted = [name for name in wanted if name not in left_out]
         if not wanted:
             raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
-        console.note_left_out(left_out)
     for name in wanted:
         _, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
         console.warn_of_faults(name, config)
+    console.note_left_out(left_out)
     return [Task(name, seed, estimator, changes) for name in wanted for seed in seeds]
 
 
