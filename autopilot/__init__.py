@@ -2,8 +2,8 @@
 
 An autopilot is any class with ``update`` (`autopilot.interface.Autopilot`).  The one shipped is in
 `autopilot.py`: `stabilise.py` holds attitude, `guidance.py` leads, `route.py` leads round circles and along legs,
-`launch.py` feels the throw, `failsafe.py` decides which mode is in force, `mixer.py` moves the surfaces.  `pilot.py`
-is the stick, a script of set-points.
+`energy.py` holds height and speed, `launch.py` feels the throw, `failsafe.py` decides which mode is in force,
+`mixer.py` moves the surfaces.  `pilot.py` is the stick, a script of set-points.
 
 =========  ==========================================  ==========================  ===================================
 Mode       The pilot, or the script, says              Held by the autopilot       Throttle, where not given

@@ -268,9 +268,10 @@ class Snapshot(NamedTuple):
 class DcmAutopilot:
     """Stabilises and leads the aeroplane on the direction cosine matrix (Premerlani & Bizard).
 
-    Needs no airspeed and no barometer: speed is guarded by pitch limits and by a throttle that follows the
-    climb demand, or, without a motor, by the pitch of the glide; height and position come from the GPS.  In
-    flight it never raises; an attitude that is not finite gets neutral controls, motor off.
+    Needs no airspeed and no barometer: height and position come from the GPS.  The airspeed that a sensor measures,
+    or that follows from an estimator's wind, is used where there is one (`autopilot.energy`); else the speed is
+    guarded by pitch limits and by a throttle that follows the climb demand, or by the pitch of the glide.  In flight
+    it never raises; an attitude that is not finite gets neutral controls, motor off.
 
     Parameters
     ----------

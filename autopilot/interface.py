@@ -66,11 +66,12 @@ class Setpoint:
     height_m : float                     COURSE, RETURN, LAUNCH, LOITER: above the launch point
     bank_limit_rad : float               COURSE, RETURN, LOITER, WAYPOINTS: the steepest bank used to turn
     throttle : 0..1 or NaN               NaN leaves the throttle to the autopilot (MANUAL: NaN is off)
-    inverted : bool                      STABILISE, COURSE: on its back; bank and pitch count from there
+    inverted : bool                      STABILISE, COURSE: on its back; bank and pitch count from there, a positive
+                                         bank turns right over the ground as ever
     north_m, east_m, radius_m : float    LOITER: centre, from the launch point, and radius
     left : bool                          LOITER: turning left
     route : of `Waypoint`                WAYPOINTS: flown in order, then again from the first; 1 to 32
-    airspeed_m_s : float or NaN          COURSE, RETURN, LOITER, WAYPOINTS: NaN is cruise
+    airspeed_m_s : float or NaN          COURSE, RETURN, LOITER, WAYPOINTS: NaN is cruise, more against a strong wind
     radio : bool                         False: the pilot is not heard any more, the rest is what he asked for last
     """
 

@@ -26,6 +26,15 @@ class NeverMissesTheGps(DcmAutopilot):
         super().__init__(patient, heading_reference, aircraft)
 
 
+class CruisesOn(DcmAutopilot):
+    """Flies at cruise speed whatever wind is against it."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        params = params_of(aircraft)
+        slow = replace(params, energy=replace(params.energy, fastest_m_s=params.energy.airspeed_m_s))
+        super().__init__(slow, heading_reference, aircraft)
+
+
 class _Mishears(DcmAutopilot):
     """Flies each set-point as `heard` has it."""
 

@@ -27,6 +27,7 @@ TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 BROKEN_AUTOPILOTS = Path(__file__).with_name("broken_autopilots.py")
 TURNS_AT_THE_CORNER = {"autopilot": f"{BROKEN_AUTOPILOTS}:TurnsAtTheCorner"}
 NEVER_MISSES_THE_GPS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverMissesTheGps"}
+CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
 RUDDER_STUCK = {"autopilot": f"{BROKEN_AUTOPILOTS}:RudderStuck"}
@@ -102,6 +103,11 @@ MUTATIONS = (
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
+    Mutation("return_to_launch_strong_wind", "premerlani", NO_YAW, "first within 25 m of the launch point"),
+    Mutation("return_to_launch_strong_wind_nose", "premerlani", NO_YAW, "first within 25 m of the launch point"),
+    Mutation(
+        "return_to_launch_stronger_wind", "gps_velocity_nose", CRUISES_ON, "first within 25 m of the launch point"
+    ),
     Mutation("rolls", "premerlani", WEAK_FEEDBACK, "inclination error RMS while rolling"),
     Mutation("rolls", "premerlani", HALF_THE_RATE, "rolled to the left"),
     Mutation("rolls_figures", "premerlani", WEAK_FEEDBACK, "inclination error RMS afterwards"),

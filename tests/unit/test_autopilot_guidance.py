@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from autopilot.autopilot import _PARAMS, _STATE
 from autopilot.guidance import (
     GuidanceParams,
+    agility,
     bank_for_heading,
     bank_to_return,
     direction_of_travel,
@@ -98,6 +99,24 @@ def test_direction_of_travel_nose_with_wind_is_the_wind_triangle(heading, blows_
     over_ground = CRUISE_M_S * np.exp(1j * heading) + speed * np.exp(1j * blows_to)
     north, east = direction_of_travel(nose(heading), wind, row_of(), state(), 1, record())
     np.testing.assert_allclose(north + 1j * east, over_ground / abs(over_ground), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("speed", [13.0, 20.0, 40.0])
+def test_direction_of_travel_blown_backwards_keeps_the_nose_in_front(speed):
+    """Wind above the airspeed, dead ahead or on the bow: one is blown back, and still not taken for flying back."""
+    for off in (0.0, 0.6, -0.6):
+        wind = -speed * np.array([math.cos(off), math.sin(off), 0.0])
+        north, east = direction_of_travel(nose(0.0), wind, row_of(), state(), 1, record())
+        assert north > 0.0
+        assert abs(math.atan2(east, north)) < 1.2
+
+
+@pytest.mark.parametrize(("ground_m_s", "part"), [(20.0, 1.0), (math.nan, 1.0), (0.45 * 12.6, 0.5), (0.0, 0.3)])
+def test_agility_is_less_over_slow_ground(ground_m_s, part):
+    """In proportion below 0.9 of cruise, never below 0.3; unknown is full."""
+    s = state()
+    s["ground_m_s"] = ground_m_s
+    np.testing.assert_allclose(agility(s, CRUISE_M_S, record()), part, rtol=0, atol=1e-12)
 
 
 def test_direction_of_travel_nose_without_wind_is_the_gps_velocity_turned_on():

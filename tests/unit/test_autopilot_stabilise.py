@@ -199,6 +199,60 @@ def test_rate_control_more_rate_gives_less_control(roll, pitch, yaw, omega):
         assert after[axis] < before[axis]
 
 
+@compiled
+@given(roll=angle, pitch=pitch, yaw=angle, bank=st.floats(-1.4, 1.4), nose=st.floats(-0.5, 0.5))
+def test_rate_demand_inverted_is_upright_in_axes_turned_half_round_the_nose(roll, pitch, yaw, bank, nose):
+    """Turned by 180 degrees about x, the same demand: p the same, q and r the opposite."""
+    R, still = attitude(roll, pitch, yaw), np.array([0.0, 0.0, 0.0])
+    turned = R @ Rotation.from_euler("X", 180.0, degrees=True).as_matrix()
+    if abs(abs(math.remainder(roll - bank, 2.0 * math.pi)) - math.pi) < 1e-6:
+        return  # exactly opposite: either way is right
+    upright = rate_demand(R, still, bank, nose, 1.0, CRUISE_M_S, record())
+    inverted = rate_demand(turned, still, bank, nose, -1.0, CRUISE_M_S, record())
+    np.testing.assert_allclose(inverted, (upright[0], -upright[1], -upright[2]), rtol=0, atol=1e-9)
+
+
+@compiled
+@given(bank=st.floats(-1.0, 1.0), yaw=angle)
+def test_rate_demand_inverted_turn_goes_the_same_way_over_the_ground(bank, yaw):
+    """A positive bank turns right on the back too: the rate about the vertical is g tan(bank) / V."""
+    R = attitude(math.pi + bank, 0.0, yaw)
+    demand = np.array(rate_demand(R, STILL, bank, 0.0, -1.0, CRUISE_M_S, record()))
+    expected = [0.0, 0.0, G_M_S2 * math.tan(bank) / CRUISE_M_S]
+    np.testing.assert_allclose(R @ demand, expected, rtol=0, atol=1e-9)
+
+
+def test_elevator_inverted_level_is_down_elevator_for_two_g_less():
+    """On its back the wing carries the weight the other way round: two units of cruise lift less, less with speed."""
+    R = attitude(math.pi, 0.0)
+    for speed_m_s in (CRUISE_M_S, 1.3 * CRUISE_M_S):
+        lift = extra_lift(0.0, R[2, 2], speed_m_s, record())
+        np.testing.assert_allclose(lift, -((CRUISE_M_S / speed_m_s) ** 2) - 1.0, rtol=0, atol=ROUND_OFF)
+    assert extra_lift(-10.0, -1.0, CRUISE_M_S, record()) == -PARAMS.inverted_lift - 1.0
+
+
+@compiled
+@given(speed=st.floats(8.0, 20.0), rate=st.floats(-2.0, 2.0), axis=st.sampled_from([0, 2]))
+def test_rate_control_deflection_for_a_rate_goes_with_one_over_speed(speed, rate, axis):
+    """The same helix angle p b / 2 V takes the same deflection."""
+    demand = (rate, 0.0, 0.0) if axis == 0 else (0.0, 0.0, rate)
+    at_cruise = control_of(demand, np.eye(3), STILL)[axis]
+    fast = rate_control(demand, np.eye(3), STILL, speed, state(), record(), 0.0)[axis]
+    np.testing.assert_allclose(fast, at_cruise * CRUISE_M_S / speed, rtol=0, atol=ROUND_OFF)
+
+
+@compiled
+@given(speed=st.floats(8.0, 20.0), load=st.floats(0.2, 1.3))
+def test_extra_lift_for_a_load_goes_with_one_over_speed_squared(speed, load):
+    """L = n W: the lift coefficient is n (V_c / V)^2 of that at cruise."""
+    np.testing.assert_allclose(
+        extra_lift(0.0, load, speed, record()) + 1.0,
+        min(load * (CRUISE_M_S / speed) ** 2, 1.0 + PARAMS.load_limit),
+        rtol=0,
+        atol=ROUND_OFF,
+    )
+
+
 def test_integral_at_the_stop_waits_and_otherwise_is_limited():
     """A surface at its stop must not wind up its integral; a lasting error never passes the limit."""
     s, p = state(), record()
