@@ -16,7 +16,7 @@ from autopilot.energy import (
     throttle_to_recover,
     want_airspeed,
 )
-from autopilot.failsafe import circle, examine, listen, mode_in_force
+from autopilot.failsafe import POOR, circle, examine, listen, mode_in_force
 from autopilot.guidance import (
     agility,
     bank_for_heading,
@@ -84,6 +84,7 @@ _STATE = np.dtype(
         ("poor_s", "f8"),  # how long the estimator has been unhealthy, counting down where it is healthy
         ("R_kept_eb", "f8", (3, 3)),  # attitude of the last healthy estimate, carried on with
         ("bias_kept_b_rad_s", "f8", (3,)),  # its offset of the gyros
+        ("wind_kept_e_m_s", "f8", (3,)),  # its wind, NaN where it told none
         ("omega_kept_b_rad_s", "f8", (3,)),
         ("height_kept_m", "f8"),  # of the beginning of LEVEL
     ],
@@ -139,7 +140,7 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
     asked, s, p, failsafe = me.asked, me.s, me.p.guidance, me.p.failsafe
     north, east = direction_of_travel(R_eb, wind_e_m_s, row, s, me.on_nose, p)
     limit_rad, wanted_m = min(asked.bank_limit_rad, p.bank_limit_rad), asked.height_m
-    if s.led_by != asked.mode:  # home whatever the pilot last said of banks
+    if s.led_by != asked.mode or not asked.radio:  # home whatever the pilot last said of banks
         limit_rad = max(limit_rad, failsafe.bank_rad)
     if s.mode == LOW:
         limit_rad = min(limit_rad, failsafe.low_bank_rad)
@@ -198,10 +199,30 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
     in_hand = s.mode == LAUNCH and s.thrown_s < 0.0
     still_s = 0.0 if in_hand else dt_s
     moved = rate_control(demand, R_eb, omega_b_rad_s, s.airspeed_m_s, s, me.p.stabilise, still_s)
-    if math.isfinite(asked.throttle) and s.mode == asked.mode and not in_hand:
+    if math.isfinite(asked.throttle) and s.mode == asked.mode and asked.radio and not in_hand:
         throttle = asked.throttle
     aileron, elevator, rudder, throttle = mix(moved[0], moved[1], moved[2], throttle, me.p.mixer)
     return aileron, elevator, rudder, throttle, bank, pitch
+
+
+@kernel
+def by_hand(asked):  # type: ignore[no-untyped-def]
+    """What `steer` returns in MANUAL: the sticks are the surfaces, no trim, no mixing."""
+    throttle = asked.throttle if math.isfinite(asked.throttle) else 0.0
+    return asked.aileron, asked.elevator, asked.rudder, throttle, MANUAL, math.nan, math.nan
+
+
+@kernel
+def steer_on(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
+    """What `steer` returns in the mode in force, on an attitude, a rate and a wind."""
+    s, p = me.s, me.p
+    s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
+    reckon_speed(wind_e_m_s, row, me, dt_s)
+    if s.mode == MANUAL:
+        return by_hand(me.asked)
+    moved = control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
+    aileron, elevator, rudder, throttle, bank, pitch = moved
+    return aileron, elevator, rudder, throttle, s.mode, bank, pitch
 
 
 @kernel
@@ -214,37 +235,28 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     """
     me = memory[0]
     asked, s, p, row = me.asked, me.s, me.p, rows[k]
-    dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S)
     known = math.isfinite(row.dt_s)
+    dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S) if known else 0.0
     for i in range(3):
         known = known and math.isfinite(omega_b_rad_s[i]) and math.isfinite(gyro_bias_b_rad_s[i])
         for j in range(3):
             known = known and math.isfinite(R_eb[i, j])
-    if not known:  # whoever does not know the attitude holds still
-        return 0.0, 0.0, 0.0, 0.0, asked.mode, math.nan, math.nan
     listen(row, s, p.failsafe, dt_s)
-    examine(R_eb, gyro_bias_b_rad_s, health, row, s, p.failsafe, p.guidance, dt_s)
+    told = health if known else POOR
+    examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, told, row, s, p.failsafe, p.guidance, dt_s)
     if asked.mode != s.asked_mode:
         ask(asked.mode, s)
     height_m = height(row, p.guidance)
     mode, led_by = mode_in_force(asked, height_m, s, p.failsafe, dt_s)
     if mode != s.mode or led_by != s.led_by:
         enter(mode, led_by, height_m, s)
-    s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
-    reckon_speed(wind_e_m_s, row, me, dt_s)
+    if mode == LEVEL and not s.believed:  # nothing of the estimate is used
+        return steer_on(s.R_kept_eb, s.omega_kept_b_rad_s, s.wind_kept_e_m_s, row, height_m, me, dt_s)
+    if known:
+        return steer_on(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
     if mode == MANUAL:
-        throttle = asked.throttle if math.isfinite(asked.throttle) else 0.0
-        # The sticks are the surfaces: no trim, no mixing.
-        return asked.aileron, asked.elevator, asked.rudder, throttle, mode, math.nan, math.nan
-    if mode == LEVEL and s.healthy_once:  # asked for, without an attitude kept, it is flown on the estimate
-        aileron, elevator, rudder, throttle, bank, pitch = control(
-            s.R_kept_eb, s.omega_kept_b_rad_s, wind_e_m_s, row, height_m, me, dt_s
-        )
-    else:
-        aileron, elevator, rudder, throttle, bank, pitch = control(
-            R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s
-        )
-    return aileron, elevator, rudder, throttle, mode, bank, pitch
+        return by_hand(asked)
+    return 0.0, 0.0, 0.0, 0.0, mode, math.nan, math.nan  # whoever does not know the attitude holds still
 
 
 def _write(setpoint: Setpoint, asked: Any) -> None:
@@ -271,7 +283,8 @@ class DcmAutopilot:
     Needs no airspeed and no barometer: height and position come from the GPS.  The airspeed that a sensor measures,
     or that follows from an estimator's wind, is used where there is one (`autopilot.energy`); else the speed is
     guarded by pitch limits and by a throttle that follows the climb demand, or by the pitch of the glide.  In flight
-    it never raises; an attitude that is not finite gets neutral controls, motor off.
+    it never raises; an attitude that is not finite gets neutral controls, motor off, until LEVEL takes over, but for
+    MANUAL, which needs none.
 
     Parameters
     ----------

@@ -6,10 +6,11 @@ Each tick, the first line that applies:
 In force            When                                        What is flown
 ==================  ==========================================  ================================================
 MANUAL, RATE        asked for, and the radio is heard           what the pilot says: nothing below takes it away
-LEVEL               the estimator was healthy once, and calls   wings level at the height where it began, on the
-                    itself POOR for `unhealthy_s` though the    attitude when it was last healthy, carried on with
-                    GPS is alive and fresh; until it is GOOD    the raw gyros less the offset believed then (Eqn
-                    as long                                     17); no height, the pitch of cruise
+LEVEL               the estimator was healthy once, and calls   wings level at the height where it began, at least
+                    itself POOR, or tells no numbers, for       `safe_height_m`, on the attitude when it was last
+                    `unhealthy_s` though the GPS is alive and   healthy, carried on with the raw gyros less the
+                    fresh; until it is GOOD as long             offset believed then (Eqn 17), in the wind believed
+                                                                then; no height, the pitch of cruise
 LAUNCH              asked for, and not over yet, radio or not   as asked
 STABILISE           asked for, and the radio is heard           as asked
 GLIDE               as CIRCLE, for more than `circle_s`         the same circle, motor off, at the pitch of a glide
@@ -20,7 +21,8 @@ LOW                 below `low_height_m`, until above           where it was goi
                     `safe_height_m`
 RETURN              the radio is silent (``Setpoint.radio``)    back to the launch point
 COURSE, RETURN,     asked for                                   as asked
-LOITER, WAYPOINTS
+LOITER, WAYPOINTS,
+LAUNCH that is over
 ==================  ==========================================  ================================================
 
 What counts for the GPS is that fixes ARRIVE: one that is 12 s late but alive is not lost.  An estimator that is POOR
@@ -87,11 +89,12 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def examine(R_eb, gyro_bias_b_rad_s, health, row, s, p, g, dt_s):  # type: ignore[no-untyped-def]
+def examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, row, s, p, g, dt_s):  # type: ignore[no-untyped-def]
     """Keep the books of the estimator: whether it is believed, and an attitude for when it is not.
 
-    R_eb : shape (3, 3), estimated   gyro_bias_b_rad_s : shape (3,)   health : what the estimator says of itself
-    s : record with `poor_s`, `believed`, `healthy_once` and the attitude, offset and rate kept, updated
+    R_eb : shape (3, 3), estimated   gyro_bias_b_rad_s : shape (3,)   wind_e_m_s : shape (3,) or NaN
+    health : what the estimator says of itself
+    s : record with `poor_s`, `believed`, `healthy_once` and the attitude, offset, wind and rate kept, updated
     p, g : records of FailsafeParams, GuidanceParams
     """
     if health == GOOD:
@@ -106,6 +109,7 @@ def examine(R_eb, gyro_bias_b_rad_s, health, row, s, p, g, dt_s):  # type: ignor
         s.healthy_once = 1
         for i in range(3):
             s.bias_kept_b_rad_s[i] = gyro_bias_b_rad_s[i]
+            s.wind_kept_e_m_s[i] = wind_e_m_s[i]
             for j in range(3):
                 s.R_kept_eb[i, j] = R_eb[i, j]
     elif s.healthy_once:
@@ -143,12 +147,16 @@ def mode_in_force(asked, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
     in_hand = mode == LAUNCH and s.thrown_s < 0.0
     if not s.believed and not in_hand:
         return LEVEL, LEVEL
-    if mode not in (COURSE, RETURN, LOITER, WAYPOINTS):
+    launched = mode == LAUNCH and s.levelled_off
+    if mode not in (COURSE, RETURN, LOITER, WAYPOINTS) and not launched:
         s.low = 0
         return mode, mode
     if s.heard_s < p.gps_back_s:
         s.circled_s += dt_s
         mode = GLIDE if s.circled_s > p.circle_s else CIRCLE
+        return mode, mode
+    if launched:  # wings level already, and on its way to its height
+        s.low = 0
         return mode, mode
     if height_m < p.low_height_m:
         s.low = 1
@@ -167,5 +175,8 @@ def circle(mode, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     if mode == GLIDE:
         return bank_rad, p.failsafe.glide_pitch_rad, 0.0
     # The climb that the GPS shows holds the pitch that gyros alone would lose; without a height, level flight.
-    pitch_rad, throttle = hold_height(s.height_kept_m if mode == LEVEL else math.nan, row, s, p, dt_s)
+    height_m = s.height_kept_m if mode == LEVEL else math.nan
+    if height_m < p.failsafe.safe_height_m:  # not where nobody knows
+        height_m = p.failsafe.safe_height_m
+    pitch_rad, throttle = hold_height(height_m, row, s, p, dt_s)
     return bank_rad, pitch_rad, throttle

@@ -301,7 +301,7 @@ def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
 
 
 class Dilshad(Compiled):
-    """The paper's estimator; see the module for what it corrects and what it leaves."""
+    """Dilshad and Jahan (2014): yaw by the magnetometer, no centrifugal term; see the module."""
 
     heading_reference: HeadingReference = "course"  # in the long run, through the GPS
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer")

@@ -370,7 +370,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class GpsVelocity(Compiled):
-    """The note's estimator; see the module.
+    """Premerlani's note of 2011: roll and pitch by the change of GPS velocity; see the module.
 
     Parameters
     ----------

@@ -369,7 +369,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class InsEkf(Compiled):
-    """The inertial navigation filter; see the module.
+    """An inertial navigation filter that models the sensors and learns the wind; see the module.
 
     Parameters
     ----------

@@ -462,7 +462,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class MatrixPilot(Compiled):
-    """MatrixPilot's present estimator; see the module for what it does other than the paper.
+    """MatrixPilot's present form of Premerlani and Bizard: turns need no GPS; see the module.
 
     Parameters
     ----------

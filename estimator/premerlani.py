@@ -379,7 +379,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Premerlani(Compiled):
-    """The paper's estimator; see the module for what it adds and corrects.
+    """Premerlani and Bizard (2009): gyros, centrifugal term, yaw by the GPS course; see the module.
 
     Parameters
     ----------

@@ -248,7 +248,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Starlino(Compiled):
-    """The tutorial's filter in both its forms; see the module."""
+    """Starlino's weighted mean of small rotations, in both its forms; see the module."""
 
     heading_reference: HeadingReference = "nose"
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "magnetometer")

@@ -7,6 +7,7 @@ from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 T = TypeVar("T")
+_MOST_TOLD = 60  # names in one message; of more, those that begin alike are told as one
 
 # What the end of a field's name says about its unit; the first that fits counts.
 _UNITS = (
@@ -52,7 +53,15 @@ def near_misses(name: str, names: Iterable[str]) -> str:
     possible = sorted(names)
     slips = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.85)  # a key or two: nothing else is meant
     close = slips or difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
+    if not close and len(possible) > _MOST_TOLD:
+        head = f"{name.partition('.')[0]}."
+        possible = [n for n in possible if n.startswith(head)] or _by_heads(possible)
     return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
+
+
+def _by_heads(names: list[str]) -> list[str]:
+    """Names in order, those that begin alike as one: ``gps.*``."""
+    return list(dict.fromkeys(f"{head}.*" if dot else head for head, dot, _ in (n.partition(".") for n in names)))
 
 
 def dotted_fields(params: Any) -> list[str]:

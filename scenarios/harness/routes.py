@@ -20,16 +20,25 @@ REACHED_M = 30.0
 
 
 def reached(p_e_m: Array, route: Sequence[Waypoint], near_m: float = REACHED_M) -> NDArray[np.int64]:
-    """How many waypoints, counted on round after round, had been reached at each tick, shape (n,)."""
+    """How many waypoints, counted on round after round, had been reached at each tick, shape (n,).
+
+    ValueError where one place is near two waypoints in turn: they would be reached without flying.
+    """
+    for w, then in zip(route, (*route[1:], *route[:1]), strict=True):
+        apart_m = math.hypot(then.north_m - w.north_m, then.east_m - w.east_m)
+        if apart_m <= 2.0 * near_m:
+            apart = f"{tuple(w)} and {tuple(then)} m, {apart_m:g} m apart"
+            raise ValueError(f"route: {apart}, must be farther apart than {2.0 * near_m:g} m")
     counts, k = np.zeros(len(p_e_m), np.int64), 0
     distances = [np.hypot(p_e_m[:, 0] - w.north_m, p_e_m[:, 1] - w.east_m) for w in route]
-    while True:
+    while route:
         due = int(counts[-1]) if len(counts) else 0
         near = np.flatnonzero(distances[due % len(route)][k:] <= near_m)
         if not len(near):
             return counts
         k += int(near[0])
         counts[k:] = due + 1
+    return counts
 
 
 def _off_leg(p_e_m: Array, begin: Array, end: Array) -> tuple[Array, Array]:

@@ -330,3 +330,68 @@ def test_failsafes_snapshot_restored_continues_exactly():
     aboard.row, aboard.ticks = row, ticks
     np.testing.assert_array_equal(aboard.fly(asking(Mode.WAYPOINTS), 30.0, gps=False), first)
     assert {c.mode for c in first} == {Mode.CIRCLE, Mode.GLIDE}
+
+
+def test_level_uses_nothing_of_the_sick_estimate():
+    """Whatever attitude, rate, offset and wind it tells, or no numbers: the commands are the same to the last bit."""
+    well = AttitudeEstimate(np.eye(3), wind_e_m_s=np.array([3.0, 0.0, 0.0]))
+    nonsense = Rotation.from_euler("ZYX", [2.0, 1.0, -2.5]).as_matrix()
+    told = (
+        poor()._replace(wind_e_m_s=np.array([50.0, -80.0, 0.0])),
+        AttitudeEstimate(nonsense, np.array([5.0, -4.0, 9.0]), np.ones(3), None, Health.POOR),
+        AttitudeEstimate(np.full((3, 3), math.nan), np.full(3, math.nan), np.zeros(3), None, Health.GOOD),
+    )
+    flown = []
+    for sick in told:
+        aboard = Aboard()
+        aboard.fly(asking(Mode.COURSE), 1.0, estimate=well)
+        aboard.fly(asking(Mode.COURSE), P.unhealthy_s + 0.1, estimate=poor()._replace(wind_e_m_s=well.wind_e_m_s))
+        flown.append(aboard.fly(asking(Mode.COURSE), 5.0, estimate=sick))
+    assert {c.mode for c in flown[0]} == {Mode.LEVEL}
+    np.testing.assert_array_equal(flown[1], flown[0])
+    np.testing.assert_array_equal(flown[2], flown[0])
+
+
+def test_estimator_that_tells_no_numbers_is_unhealthy():
+    """Neutral for as long as one that says POOR is borne, then level on the gyros; the sticks move the surfaces."""
+    aboard, none = Aboard(), AttitudeEstimate(np.full((3, 3), math.nan))
+    aboard.fly(asking(Mode.COURSE), 1.0)
+    commands = aboard.fly(asking(Mode.COURSE), P.unhealthy_s + 1.0, estimate=none)
+    assert commands[0][:4] == (0.0, 0.0, 0.0, 0.0)
+    assert commands[-1].mode == Mode.LEVEL
+    assert commands[-1].throttle > 0.0
+    stick = aboard.fly(asking(Mode.MANUAL, aileron=0.5, throttle=0.7), DT_S, estimate=none)[0]
+    assert (stick.aileron, stick.throttle) == (0.5, 0.7)
+
+
+def test_level_too_near_the_ground_climbs():
+    """Taken ill at 8 m, it does not stay there."""
+    aboard = Aboard()
+    aboard.height_m = 8.0
+    aboard.fly(asking(Mode.STABILISE), 1.0)
+    command = aboard.fly(asking(Mode.STABILISE), P.unhealthy_s + 1.0, estimate=poor())[-1]
+    assert command.mode == Mode.LEVEL
+    assert command.pitch_demand_rad > EnergyParams().pitch_trim_rad
+    assert command.throttle > EnergyParams().throttle_trim
+
+
+def test_gps_silent_circles_after_a_launch_that_is_over():
+    """At its height a launch holds no course: without fixes it would fly away straight ahead."""
+    aboard, launch = Aboard(), asking(Mode.LAUNCH)
+    aboard.height_m = 49.0
+    aboard.row["force_b_m_s2"] = (27.0, 0.0, -9.8)
+    aboard.fly(launch, 0.3)
+    aboard.row["force_b_m_s2"] = (0.0, 0.0, -9.8)
+    aboard.fly(launch, 3.0)
+    assert [m for m, _ in aboard.modes(launch, 40.0, gps=False)] == [Mode.LAUNCH, Mode.CIRCLE, Mode.GLIDE]
+    assert [m for m, _ in aboard.modes(launch, 5.0)] == [Mode.GLIDE, Mode.LAUNCH]
+
+
+def test_radio_lost_on_the_way_home_obeys_neither_throttle_nor_bank_limit():
+    """RETURN was asked for already, motor off and without bank: what nobody can take back is not obeyed."""
+    aboard, home = Aboard(), asking(Mode.RETURN, throttle=0.0, bank_limit_rad=0.0)
+    told = aboard.fly(home, 1.0)[-1]
+    assert (told.throttle, told.bank_demand_rad) == (0.0, 0.0)
+    alone = aboard.fly(asking(Mode.RETURN, throttle=0.0, bank_limit_rad=0.0, radio=False), 1.0)[-1]
+    assert alone.throttle > 0.0
+    assert abs(alone.bank_demand_rad) > 0.8 * P.bank_rad

@@ -72,3 +72,10 @@ def test_reached_of_a_flight_that_never_flew_is_empty():
     """Nothing was reached, and nothing breaks."""
     assert len(reached(np.zeros((0, 3)), SQUARE)) == 0
     assert np.isnan(waypoints_reached(SQUARE)(flight_of([], [], [])).value)
+
+
+@pytest.mark.parametrize("route", [SQUARE[:1], (*SQUARE, Waypoint(10, 0, 60))])
+def test_reached_route_whose_waypoints_overlap_is_refused(route):
+    """One waypoint alone, or two within reach of one place: counting would never end."""
+    with pytest.raises(ValueError, match=r"farther apart than 60 m"):
+        reached(np.zeros((10, 3)), route)
