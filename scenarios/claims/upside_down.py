@@ -1,4 +1,4 @@
-"""Navigation straight from the matrix, upside down as well: prescribed turns on the back, computed open loop."""
+"""Navigation straight from the matrix, upside down as well: prescribed turns on the back, and a square flown so."""
 
 import math
 from collections.abc import Sequence
@@ -10,11 +10,17 @@ from matplotlib.figure import Figure
 
 from autopilot.guidance import heading_error
 from estimator.interface import Array
+from estimator.kernels import wrap
 from estimator.premerlani import Premerlani
+from scenarios.claims._flown import course_rad
 from scenarios.claims._open_loop import begin, inclination_deg, sensed
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, axes, label
-from sim.log import Log, Phase
+from scenarios.harness.claim_flights import flights
+from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, axes, label
+from scenarios.harness.manoeuvres import inverted
+from scenarios.harness.metrics import survived, time_s
+from scenarios.inverted import FIRST_S, LEGS
+from sim.log import Flight, Log, Phase
 from sim.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, SteadyTurn, rotation_from_euler
 
 FLOWN_S, SETTLED_S = 120.0, 20.0
@@ -55,7 +61,40 @@ def _steering_error_deg(R_eb: Array, log: Log) -> Array:
     return worst
 
 
-def _upside_down(_seeds: Sequence[int]) -> Finding:
+LEG_S = 15.0  # of the square
+LAST_S = 4.0  # of a leg: by then the corner lies behind
+ON_THE_LEG_DEG = 10.0
+
+
+def _turned_deg(flight: Flight) -> Array:
+    """True course from the first leg on, to the right, degrees."""
+    start_rad = math.radians(flight.manifest["config"]["start"]["heading_deg"])
+    return np.degrees(np.unwrap(wrap(course_rad(flight) - start_rad)))
+
+
+def _asked_deg(flight: Flight) -> Array:
+    """The same of the leg that is asked for: a right angle more each time."""
+    return 90.0 * np.clip(np.floor((time_s(flight) - FIRST_S) / LEG_S), 0, LEGS - 1)
+
+
+def _off_the_legs_deg(flight: Flight) -> list[float]:
+    """By how much the mean course is off, at the end of each leg; NaN where it is not flown upside down."""
+    t_s, off = time_s(flight), np.abs(_turned_deg(flight) - _asked_deg(flight))
+    ends_s = [FIRST_S + (leg + 1) * LEG_S for leg in range(LEGS)]
+    at_end = [(t_s > end_s - LAST_S) & (t_s <= end_s) for end_s in ends_s]
+    return [float(off[at].mean()) if inverted(flight)[at].all() else math.nan for at in at_end]
+
+
+def _wrong_way_up(flight: Flight) -> int:
+    """Ticks at which r_zz has the wrong sign, but for those within 6 degrees of knife edge."""
+    true, told = flight.log.truth["R_eb"][:, 2, 2], flight.log.flown["R_eb"][:, 2, 2]
+    return int(np.sum((np.sign(true) != np.sign(told)) & (np.abs(true) > 0.1)))
+
+
+def _upside_down(seeds: Sequence[int]) -> Finding:
+    flown = flights("inverted", seeds)
+    off_the_legs = float(np.max([_off_the_legs_deg(flight) for flight in flown]))
+    survive = 100.0 * float(np.mean([survived(flight).value for flight in flown]))
     logs = {
         way: sensed(motion, FLOWN_S) for way, motion in (("back", OnItsBack(BANK_RAD)), ("belly", SteadyTurn(BANK_RAD)))
     }
@@ -75,7 +114,7 @@ def _upside_down(_seeds: Sequence[int]) -> Finding:
     off, off_belly = (float(steering[way][later].max()) for way in ("back", "belly"))
 
     def draw(figure: Figure) -> None:
-        error, elements = axes(figure, "Which way to turn: error", "On its back: what the matrix tells")
+        error, elements, square = axes(figure, "Way to turn: error", "On its back: told", "A square flown on its back")
         t_s = logs["back"].truth["t_s"]
         error.plot(t_s, steering["back"], color=BLUE, label="on its back")
         error.plot(t_s, steering["belly"], "--", color=ORANGE, label="upright", lw=1.2)
@@ -87,7 +126,16 @@ def _upside_down(_seeds: Sequence[int]) -> Finding:
         elements.axhline(0.0, color=FAINT, lw=1)
         elements.set_xlim(0.0, 40.0)
         elements.legend(loc="center right")
-        label(elements, "s", "")
+        label(elements, "s", "r_zz; part of the true rate")
+        for i, flight in enumerate(flown):
+            shown = (time_s(flight) > FIRST_S) & (time_s(flight) < FIRST_S + LEGS * LEG_S)
+            t_s = time_s(flight)[shown] - FIRST_S
+            square.plot(t_s, _turned_deg(flight)[shown], color=GREEN, lw=1, label=None if i else "course")
+            if i == 0:
+                square.plot(t_s, _asked_deg(flight)[shown], "--", color=FAINT, lw=1, label="asked for")
+        square.set_yticks((0, 90, 180, 270))
+        square.legend(loc="upper left")
+        label(square, "s", "deg to the right of the first leg")
 
     return Finding(
         stands=(
@@ -95,11 +143,16 @@ def _upside_down(_seeds: Sequence[int]) -> Finding:
             line("tilt error, upside down", "deg", float(tilt["back"][later].max()), "<=", 5.0),
             line("ticks at which r_zz has the wrong sign", "", sign_wrong, "<=", 0.0),
             line("rate of turn about the vertical: error", "deg/s", rate_error, "<=", 0.5),
+            line("flown: flights that survive", "%", survive, ">=", 100.0),
+            line("flown: course off the one asked for, any leg", "deg", off_the_legs, "<=", ON_THE_LEG_DEG),
+            line("flown: ticks at which r_zz has the wrong sign", "", max(map(_wrong_way_up, flown)), "<=", 0.0),
         ),
         told=f"In turns on its back, the heading 40 degrees wrong at first, the deviation from any direction is "
         f"told to {off:.1f} degrees by cross and dot product once yaw is locked (upright: {off_belly:.1f}), the rate "
-        f"of turn to {rate_error:.2f} deg/s, and r_zz is negative all the time.",
-        seeds=0,
+        f"of turn to {rate_error:.2f} deg/s, and r_zz is negative all the time. A square flown on "
+        f"its back in wind, steered by the estimate, is at most {off_the_legs:.0f} degrees off its course at the end "
+        "of any leg.",
+        seeds=len(seeds),
         draw=draw,
     )
 
@@ -114,6 +167,6 @@ CLAIMS = (
         "sign of r_zz tells that one is, and the third row with the gyros tells the rate of turn.",
         expected=Verdict.CONFIRMED,
         measure=_upside_down,
-        seeds=0,
+        seeds=5,
     ),
 )

@@ -6,18 +6,19 @@ import numpy as np
 import pytest
 
 from estimator.premerlani import PremerlaniParams
-from scenarios.claims import centrifugal, course, latency, launch, upside_down
+from scenarios.claims import centrifugal, course, latency, launch, upside_down, vertical_flight
 from scenarios.claims._flown import crab_deg, median, slowest
 from scenarios.claims._open_loop import begin, inclination_deg, sensed
 from scenarios.claims.centrifugal import Uncompensated
 from scenarios.claims.latency import Kink
 from scenarios.claims.upside_down import BANK_RAD, OnItsBack
+from scenarios.claims.vertical_flight import UpAndOn
 from scenarios.harness.claim import Verdict
 from scenarios.harness.claim_flights import flights
 from sim.place import LATITUDE_DEG
 from sim.prescribed_plant import SteadyTurn, inertial_rate_and_force
 
-MODULES = (launch, centrifugal, course, latency, upside_down)
+MODULES = (launch, centrifugal, course, latency, upside_down, vertical_flight)
 CLAIMS = {claim.name: claim for module in MODULES for claim in module.CLAIMS}
 
 
@@ -32,7 +33,7 @@ def test_claim_is_well_formed(claim):
     assert len(CLAIMS) == sum(len(module.CLAIMS) for module in MODULES)
 
 
-@pytest.mark.parametrize("name", ["accelerometer_dives", "gps_filter_settles", "upside_down"])
+@pytest.mark.parametrize("name", ["accelerometer_dives", "gps_filter_settles", "upside_down", "vertical_flight"])
 def test_cheap_claims_are_confirmed(name):
     """The verdict on two seeds is the one expected of ten."""
     finding = CLAIMS[name].measure((0, 1))
@@ -78,6 +79,19 @@ def test_turn_on_its_back_feels_its_weight_on_the_belly_side():
     assert np.allclose(force_b[:, 2], 9.8 / math.cos(BANK_RAD), rtol=0, atol=0.05)  # gravity by latitude
     heading_rate = np.einsum("ni,ni->n", motion.at(t_s).R_eb[:, 2], omega_b)
     assert np.allclose(heading_rate, 9.8 * math.tan(BANK_RAD) / 12.6, rtol=0, atol=2e-3)
+
+
+def test_climb_stays_on_its_path_and_along_its_nose():
+    """Straight up in the middle, level at both ends, and the position is the integral of the velocity."""
+    t_s = np.linspace(0.0, 140.0, 14001)
+    at = UpAndOn().at(t_s)
+    assert np.allclose(at.v_e_m_s[(t_s > 70.0) & (t_s < 90.0)], (0.0, 0.0, -12.6), rtol=0, atol=1e-12)
+    assert np.allclose(at.v_e_m_s[(t_s < 60.0) | (t_s > 100.0)], (12.6, 0.0, 0.0), rtol=0, atol=1e-12)
+    assert np.allclose(at.R_eb[:, :, 0] * 12.6, at.v_e_m_s, rtol=0, atol=1e-12)
+    mean_v, mean_a = (0.5 * (of[1:] + of[:-1]) * 0.01 for of in (at.v_e_m_s, at.a_e_m_s2))
+    # The trapezium: a^2 dt^3 / 12 a step; where the acceleration begins or ends half a step of 2 m/s^2, four times.
+    assert np.allclose(np.cumsum(mean_v, axis=0), at.p_e_m[1:] - at.p_e_m[0], rtol=0, atol=1e-3)
+    assert np.allclose(np.cumsum(mean_a, axis=0), at.v_e_m_s[1:] - at.v_e_m_s[0], rtol=0, atol=0.05)
 
 
 def test_kink_turns_the_velocity_at_once_and_stays_on_its_path():
