@@ -67,8 +67,8 @@ def _centrifugal(seeds: Sequence[int]) -> Finding:
         error.legend(loc="upper right")
         error.set_ylim(0.0, 42.0)
         bank_ax.set_ylim(0.0, 60.0)
-        label(error, "s", "deg")
-        label(bank_ax, "s", "deg")
+        label(error, "time, s", "deg")
+        label(bank_ax, "time, s", "deg")
 
     return Finding(
         stands=(

@@ -15,7 +15,15 @@ from estimator.dilshad import Dilshad, DilshadParams, paper_angles
 from estimator.interface import Array
 from estimator.rotation import heading_error_rad
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_motions import DECLINATION_RAD, FIELD_E_UT, RATES, calibration, mean_at_rest, seen
+from scenarios.harness.claim_motions import (
+    DECLINATION_RAD,
+    FIELD_E_UT,
+    RATES,
+    calibration,
+    mean_at_rest,
+    seen,
+    tilt_deg,
+)
 from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import rms
 from sim.hover import Hover
@@ -64,18 +72,20 @@ def angles_off_deg(R_eb: Array, log: Log) -> Array:
 
 
 def _ground(seeds: Sequence[int]) -> Finding:
-    wavering, off, raw, gyros = [], [], [], []
+    wavering, off, leaning, raw, gyros = [], [], [], [], []
     for seed in seeds:
         log = on_the_ground(seed)
         calibrated, uncalibrated = estimated(log, seed), as_it_comes(log)
         wavering.append(np.std(angles_off_deg(calibrated, log), axis=1))
         off.append(rms(heading_off_deg(calibrated, log)))
+        leaning.append(tilt_deg(calibrated, log)[SETTLED:])
         raw.append(rms(_wrapped_deg(heading_off_deg(uncalibrated, log))))
         alone = GyroOnly()
         alone.reset(mean_at_rest(BOARD, seed))
         gyros.append(abs(heading_off_deg(np.asarray(alone.replay(log.measured)["R_eb"]), log)[-1]))
     roll, pitch, yaw = np.sqrt(np.mean(np.square(wavering), axis=0))
     pooled, pooled_raw, pooled_gyros = (rms(np.array(values)) for values in (off, raw, gyros))
+    tilt = rms(np.concatenate(leaning))
     first = on_the_ground(seeds[0])
 
     def draw(figure: Figure) -> None:
@@ -95,12 +105,14 @@ def _ground(seeds: Sequence[int]) -> Finding:
             line("roll wavers, sd", "deg", roll, "<=", 0.5),
             line("pitch wavers, sd", "deg", pitch, "<=", 0.5),
             line("yaw wavers, sd", "deg", yaw, "<=", 0.5),
+            line("roll and pitch together off zero, RMS", "deg", tilt, "<=", 2.0),
             line("yaw off, RMS", "deg", pooled, "<=", 5.0),
             line("yaw off after 10 minutes, gyros alone", "deg", pooled_gyros, ">=", 10.0),
         ),
         told=f"On the ground for 10 minutes roll, pitch and yaw waver by {roll:.2f}, {pitch:.2f} and {yaw:.2f} degrees "
-        f"and yaw is {pooled:.1f} off; gyros alone would be {pooled_gyros:.0f} off. As it comes, neither gyros nor "
-        f"magnetometer calibrated, the yaw is {pooled_raw:.0f} degrees off.",
+        f"and are off by {tilt:.1f} (roll and pitch together) and {pooled:.1f}; gyros alone would be "
+        f"{pooled_gyros:.0f} off. As it comes, neither gyros nor magnetometer calibrated, the yaw is "
+        f"{pooled_raw:.0f} degrees off.",
         seeds=len(seeds),
         draw=draw,
     )
@@ -130,8 +142,8 @@ def _hover(seeds: Sequence[int]) -> Finding:
             line("pitch wavers, sd", "deg", pitch, "<=", 1.0),
             line("yaw wavers, of the larger of these", "", yaw / max(roll, pitch), ">=", 1.5),
         ),
-        told=f"Hovering, roll and pitch waver by {roll:.2f} and {pitch:.2f} degrees, yaw by {yaw:.1f}: more than "
-        "three times as much, in waves.",
+        told=f"Hovering, roll and pitch waver by {roll:.2f} and {pitch:.2f} degrees, yaw by {yaw:.1f}: "
+        f"{yaw / max(roll, pitch):.1f} times as much, in waves.",
         seeds=len(seeds),
         draw=draw,
     )
@@ -175,10 +187,7 @@ def _wave(seeds: Sequence[int]) -> Finding:
         label(deaf, "time, minutes", "yaw error, deg")
 
     return Finding(
-        stands=(
-            line("wave without the delay, of that with it", "", undelayed / delayed, "<=", 0.8),
-            line("wave where there is no GPS, sd", "deg", none, "<=", 0.5),
-        ),
+        stands=(line("wave without the delay, of that with it", "", undelayed / delayed, "<=", 0.8),),
         told=f"Where a hovering craft believes its course, the yaw waves by {delayed:.0f} degrees (sd) with the "
         f"receiver's delay and by {undelayed:.0f} without: what does not travel has no course. Without any GPS it "
         f"waves by {none:.1f}: the accelerometer does not feel the craft lean, which the dip of the field makes a "

@@ -14,7 +14,7 @@ from scenarios.claims._open_loop import sensed
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claim_flights import flights
 from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
-from scenarios.harness.metrics import bank_size_deg, heading_error_deg, time_s
+from scenarios.harness.metrics import bank_size_deg, heading_error_deg, inclination_error_deg, time_s
 from sim.log import Phase
 from sim.prescribed_plant import CALM, Kinematics, rotation_from_euler
 
@@ -22,6 +22,7 @@ COURSE = heading_error_deg("course")
 SETTLED_S = 20.0
 SMALL_DEG = 10.0  # a heading error that navigation hardly sees: sideways it is a sixth of the way
 LOST_DEG = 45.0  # one that leads astray
+LEFT = 0.5  # whoever makes up for an error leaves less than half of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,9 +166,10 @@ def _latency(seeds: Sequence[int]) -> Finding:
             line("1 s, unknown: the worst flight", "deg RMS", max(unaware[1.0]), "<=", SMALL_DEG),
             line("12 s, known: the worst flight", "deg RMS", max(aware[12.0]), "<=", SMALL_DEG),
         ),
-        told=f"Fixes 12 s late break an estimator that does not know ({np.median(unaware[12.0]):.0f} degrees), and far "
-        f"less does: the first flights go astray at {some_from:g} s, all are lost from {lost_from:g} s on. A second is "
-        f"harmless ({max(unaware[1.0]):.1f}), and an estimator that knows its 12 s flies straight "
+        told=f"Straight ahead, fixes 12 s late break an estimator that does not know "
+        f"({np.median(unaware[12.0]):.0f} degrees), and far less does: the first flights go astray at {some_from:g} s, "
+        f"all are lost from {lost_from:g} s on. A second is harmless there ({max(unaware[1.0]):.1f}; in turns it is "
+        f"not, see where the lag is ignored), and an estimator that knows its 12 s flies straight "
         f"({np.median(aware[12.0]):.1f}).",
         seeds=len(seeds),
         draw=draw,
@@ -221,6 +223,7 @@ def _lag_ignored(seeds: Sequence[int]) -> Finding:
 def _lag_filter(seeds: Sequence[int]) -> Finding:
     flown = {way: flights("turns_180", seeds, tuned(**params)) for way, (params, _) in _WAYS.items()}
     published = flights("turns_180", seeds, tuned(**PUBLISHED))
+    tilts = " / ".join(f"{pooled_rms(found, inclination_error_deg, SETTLED_S):.1f}" for found in flown.values())
     error = {way: pooled_rms(found, COURSE, SETTLED_S) for way, found in flown.items()}
     ignored, filtered, freed = error.values()
     turning = {way: rms_in_turns(found, COURSE, SETTLED_S) for way, found in flown.items()}
@@ -241,13 +244,13 @@ def _lag_filter(seeds: Sequence[int]) -> Finding:
 
     return Finding(
         stands=(
-            line("part of the heading error that the filter leaves", "", filtered / ignored, "<=", 0.75),
-            line("the same in turns", "", turning["filtered"] / turning["ignored"], "<=", 0.75),
+            line("part of the heading error that the filter leaves", "", filtered / ignored, "<=", LEFT),
+            line("the same in turns", "", turning["filtered"] / turning["ignored"], "<=", LEFT),
         ),
         told=f"The filter on the matrix's side takes the heading error of turns in wind from {ignored:.1f} degrees RMS "
         f"to {filtered:.1f}, far more than the small improvement that the paper sees in it; with the paper's bare "
         f"equations it is {pooled_rms(published, COURSE, SETTLED_S):.1f}. With the corrections taken out of its loop "
-        f"it is {freed:.1f}.",
+        f"it is {freed:.1f}. The tilt is off by {tilts} degrees RMS (ignored, filtered, freed).",
         seeds=len(seeds),
         draw=draw,
     )
@@ -267,7 +270,7 @@ CLAIMS = (
     ),
     Claim(
         name="report_rate",
-        title="Five reports a second are no better than one",
+        title="Five reports a second need not be better than one",
         paper=Paper.THEORY,
         place="GPS, on reporting rates",
         says="A higher reporting rate does not by itself bring a better dynamic response: the filter in the receiver "

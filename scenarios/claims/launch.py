@@ -147,7 +147,7 @@ def _averages_out(seeds: Sequence[int]) -> Finding:
         ),
         told=f"In flight with turns the forward acceleration feigns {second:.1f} degrees over a second, {ten:.1f} over "
         f"10 s and {long:.1f} over 40 s. The push of a launch feigns {felt:.0f} degrees, of which at most {peak:.0f} "
-        f"get into the matrix; 10 s later it is off by {later:.1f} degrees RMS, as ever.",
+        f"get into the matrix; 10 s later it is off by {later:.1f} degrees RMS.",
         seeds=len(seeds),
         draw=draw,
     )

@@ -93,18 +93,18 @@ def _after_the_loops(flight: Flight) -> Any:
 
 def _saturation_erased(seeds: Sequence[int]) -> Finding:
     flown = {
-        "as printed": flights("gyro_saturation", seeds, NO_GATE),
+        "a weight of 0.3": flights("gyro_saturation", seeds, NO_GATE),
         "a fifth of the weight": flights("gyro_saturation", seeds, {**NO_GATE, "estimator_params.w_rp": 0.06}),
     }
     errors = {how: [_after_the_loops(flight) for flight in these] for how, these in flown.items()}
     erased = {how: [settled_after_s(series, ERASED_DEG) for series in these] for how, these in errors.items()}
-    left = float(np.mean([series.value[: 2 * IMU_HZ].max() for series in errors["as printed"]]))
-    mean_s, slowest_s = float(np.mean(erased["as printed"])), float(np.max(erased["as printed"]))
+    left = float(np.mean([series.value[: 2 * IMU_HZ].max() for series in errors["a weight of 0.3"]]))
+    mean_s, slowest_s = float(np.mean(erased["a weight of 0.3"])), float(np.max(erased["a weight of 0.3"]))
     slack = [t for t in erased["a fifth of the weight"] if math.isfinite(t)]
 
     def draw(figure: Figure) -> None:
         (ax,) = axes(figure, "Three loops beyond the range of the gyros, and what comes after")
-        for how, colour in (("a fifth of the weight", FAINT), ("as printed", BLUE)):
+        for how, colour in (("a fifth of the weight", FAINT), ("a weight of 0.3", BLUE)):
             for i, series in enumerate(errors[how]):
                 since = series.t_s - series.t_s[0]
                 ax.plot(since, series.value, color=colour, lw=1.3, label=how if i == 0 else None)

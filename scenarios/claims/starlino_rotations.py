@@ -91,7 +91,7 @@ def _half_each(_seeds: Sequence[int]) -> Finding:
     off = np.array([_off_after_10_s(float(share)) for share in shares])
 
     def draw(figure: Figure) -> None:
-        of_cosine, of_share = axes(figure, "The error e between I and J, halved between them", "10 s at 60 deg/s")
+        of_cosine, of_share = axes(figure, "Half of e to I, half to J", "After 10 s at 60 deg/s")
         of_cosine.loglog(cosines, left, color=BLUE, lw=2, label="left of it")
         of_cosine.loglog(cosines, cosines**3 / 4.0, "--", color=FAINT, label="e³/4")
         of_cosine.loglog(cosines, cosines, ":", color=FAINT, label="e")
@@ -164,8 +164,8 @@ def _gyro_sign(_seeds: Sequence[int]) -> Finding:
     return Finding(
         stands=(line("heading error RMS as printed", "deg", off, "<=", 1.0),),
         told=f"As printed the matrix turns backwards: {off:.0f} degrees off (RMS) where the body turns by 60 to and "
-        f"fro. A gyro measures the rate of the device, the world turns the other way; so read, {right:.2f} degrees are "
-        f"left.",
+        f"fro. A gyro measures the rate of the device, the world turns the other way; so read, as the code of "
+        f"his comment 37 does, {right:.2f} degrees are left.",
         seeds=0,
         draw=draw,
     )

@@ -120,13 +120,13 @@ def _upside_down(seeds: Sequence[int]) -> Finding:
         error.plot(t_s, steering["belly"], "--", color=ORANGE, label="upright", lw=1.2)
         error.set_xlim(0.0, 40.0)
         error.legend()
-        label(error, "s", "deg, the worst of 24 directions")
+        label(error, "time, s", "deg, the worst of 24 directions")
         for values, colour, name in ((r_zz, BLUE, "r_zz"), (turn_deg_s / true_deg_s, ORANGE, "rate of turn / true")):
             elements.plot(t_s, values, color=colour, label=name)
         elements.axhline(0.0, color=FAINT, lw=1)
         elements.set_xlim(0.0, 40.0)
         elements.legend(loc="center right")
-        label(elements, "s", "r_zz; part of the true rate")
+        label(elements, "time, s", "r_zz; part of the true rate")
         for i, flight in enumerate(flown):
             shown = (time_s(flight) > FIRST_S) & (time_s(flight) < FIRST_S + LEGS * LEG_S)
             t_s = time_s(flight)[shown] - FIRST_S
@@ -135,7 +135,7 @@ def _upside_down(seeds: Sequence[int]) -> Finding:
                 square.plot(t_s, _asked_deg(flight)[shown], "--", color=FAINT, lw=1, label="asked for")
         square.set_yticks((0, 90, 180, 270))
         square.legend(loc="upper left")
-        label(square, "s", "deg to the right of the first leg")
+        label(square, "time, s", "deg to the right of the first leg")
 
     return Finding(
         stands=(

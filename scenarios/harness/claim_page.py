@@ -11,8 +11,8 @@ MARKS = {Verdict.CONFIRMED: "✅", Verdict.WITH_CONDITION: "🟡", Verdict.REFUT
 
 HEAD = """# What the papers claim, put to the test
 
-Every sentence of the papers that can be true or false, in our own words, flown or computed, and judged by lines with
-limits. A limit is what the sentence amounts to in numbers, not what came out.
+Sentences of the papers that can be true or false, in our own words, flown or computed, and judged by lines with limits.
+A limit is what the sentence amounts to in numbers, not what came out.
 
 - ✅ confirmed: every line of the claim as it stands holds
 - 🟡 confirmed with a condition: not every one of them does, but every line under the condition that is named
