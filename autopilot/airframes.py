@@ -47,7 +47,6 @@ _GENTLE_LADY = AutopilotParams(
         roll_control_per_error=0.1,
         pitch_gain_1_s=2.0,
         pitch_rate_limit_rad_s=0.5,
-        recovery_roll_rate_rad_s=0.5,
         recovery_pitch_rate_rad_s=0.8,
         elevator_per_pitch_rate_s=0.2,
         elevator_per_rate_error_s=0.2,

@@ -30,8 +30,9 @@ class StabiliseParams:
 
     airspeed_m_s : of cruise; stands in for the airspeed nobody measures
     roll_gain_1_s, pitch_gain_1_s : rate demanded per sine of the error; larger is quicker, then nervous
-    roll_rate_limit_rad_s, pitch_rate_limit_rad_s : the most the outer loop asks for
-    recovery_roll_rate_rad_s, recovery_pitch_rate_rad_s : the same with the lift pointing down, the nose far off
+    roll_rate_limit_rad_s, pitch_rate_limit_rad_s : the most the outer loop asks for; a rate beyond what the gyros
+        can tell is never seen to be there, and is flown with full deflection for ever
+    recovery_pitch_rate_rad_s : the same with the nose far off
     roll_control_per_rate_s, .._per_rate_error_s, .._per_error : feed-forward, damping, integral; what moves, ailerons
         or a rudder that rolls by way of the dihedral, is the mixer's business
     elevator_per_pitch_rate_s, .._per_rate_error_s, .._per_pitch_error : the same
@@ -46,7 +47,6 @@ class StabiliseParams:
     roll_rate_limit_rad_s: float = 1.5
     pitch_gain_1_s: float = 2.5
     pitch_rate_limit_rad_s: float = 0.8
-    recovery_roll_rate_rad_s: float = 2.5
     recovery_pitch_rate_rad_s: float = 1.4
     roll_control_per_rate_s: float = 0.3
     roll_control_per_rate_error_s: float = 0.12
@@ -128,8 +128,7 @@ def rate_demand(R_eb, omega_b_rad_s, bank_rad, pitch_rad, up, airspeed_m_s, p): 
     r_zx, r_zy, r_zz = R_eb[2, 0], R_eb[2, 1], R_eb[2, 2]
     turn = turn_rate(R_eb, up, airspeed_m_s)
     roll = p.roll_gain_1_s * roll_error(R_eb, omega_b_rad_s, bank_rad, up)
-    most = p.roll_rate_limit_rad_s if up * r_zz > 0.0 else p.recovery_roll_rate_rad_s
-    roll = clip(roll, -most, most)
+    roll = clip(roll, -p.roll_rate_limit_rad_s, p.roll_rate_limit_rad_s)
     lift_is_up = clip(up * r_zz / max(math.hypot(r_zy, r_zz), 0.1), 0.0, 1.0)  # cosine of the bank
     missing = math.sin(pitch_rad) + r_zx  # r_zx is minus the sine of the pitch
     most = p.pitch_rate_limit_rad_s

@@ -87,7 +87,7 @@ def test_roll_demand_inverted_is_saturated_the_shorter_way(degrees):
     """With r_zz < 0 the roll rate demanded is the limit, opposite to the bank."""
     R = attitude(math.radians(degrees), 0.1)
     p, _, _ = rate_demand(R, STILL, 0.0, 0.0, 1.0, CRUISE_M_S, record())
-    assert p == -math.copysign(PARAMS.recovery_roll_rate_rad_s, degrees)
+    assert p == -math.copysign(PARAMS.roll_rate_limit_rad_s, degrees)
 
 
 def test_roll_demand_exactly_inverted_keeps_rolling_the_way_it_rolls():
