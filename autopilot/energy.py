@@ -166,7 +166,7 @@ def want_airspeed(asked, travels, s, e):  # type: ignore[no-untyped-def]
     s : record with `inverted`, `headwind_m_s`   e : record of EnergyParams
     """
     wanted_m_s = e.inverted_m_s if s.inverted else e.airspeed_m_s
-    if travels and math.isfinite(asked.airspeed_m_s):
+    if travels and asked.radio and math.isfinite(asked.airspeed_m_s):
         wanted_m_s = clip(asked.airspeed_m_s, least_airspeed(s, e), e.fastest_m_s)
     elif travels:
         wanted_m_s = max(wanted_m_s, speed_to_fly(s.headwind_m_s, e))

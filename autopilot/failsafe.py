@@ -9,8 +9,8 @@ MANUAL, RATE        asked for, and the radio is heard           what the pilot s
 LEVEL               the estimator was healthy once, and calls   wings level at the height where it began, at least
                     itself POOR, or tells no numbers, for       `safe_height_m`, on the attitude when it was last
                     `unhealthy_s` though the GPS is alive and   healthy, carried on with the raw gyros less the
-                    fresh; until it is GOOD as long             offset believed then (Eqn 17), in the wind believed
-                                                                then; no height, the pitch of cruise
+                    shows a course; until it is GOOD as long    offset believed then (Eqn 17), in the wind believed
+                                                                then
 LAUNCH              asked for, and not over yet, radio or not   as asked
 STABILISE           asked for, and the radio is heard           as asked
 GLIDE               as CIRCLE, for more than `circle_s`         the same circle, motor off, at the pitch of a glide
@@ -55,6 +55,8 @@ class FailsafeParams:
     circle_s : of the circle at cruise, before the motor is switched off
     bank_rad : of the circle         glide_pitch_rad : of the glide, motor off
     unhealthy_s : an estimator that is POOR for so long is not believed, one that is GOOD for so long is again
+    course_speed_m_s : over the ground; below, as against a strong wind, an estimator may want for a course, and is POOR
+        for that alone
     low_height_m, safe_height_m : below the first too low, above the second no longer
     low_bank_rad : the steepest bank while too low        climb_m : height asked for above that of now, while too low
     """
@@ -65,6 +67,7 @@ class FailsafeParams:
     bank_rad: float = math.radians(10.0)
     glide_pitch_rad: float = math.radians(-4.0)
     unhealthy_s: float = 5.0
+    course_speed_m_s: float = 5.0
     low_height_m: float = 20.0
     safe_height_m: float = 30.0
     low_bank_rad: float = math.radians(15.0)
@@ -89,6 +92,12 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def has_course(row, p):  # type: ignore[no-untyped-def]
+    """Whether the last fix moves fast enough over the ground to have a course."""
+    return math.hypot(row.gps_v_e_m_s[0], row.gps_v_e_m_s[1]) >= p.course_speed_m_s
+
+
+@kernel
 def examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, row, s, p, g, dt_s):  # type: ignore[no-untyped-def]
     """Keep the books of the estimator: whether it is believed, and an attitude for when it is not.
 
@@ -99,7 +108,7 @@ def examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, row, s, p, g, dt_s):  #
     """
     if health == GOOD:
         s.poor_s = max(s.poor_s - dt_s, 0.0)
-    elif health == POOR and s.heard_s >= p.gps_back_s and math.isfinite(gps_age(row, g)):
+    elif health == POOR and s.heard_s >= p.gps_back_s and math.isfinite(gps_age(row, g)) and has_course(row, p):
         s.poor_s = min(s.poor_s + dt_s, p.unhealthy_s)
     if s.poor_s == 0.0:
         s.believed = 1

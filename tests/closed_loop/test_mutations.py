@@ -56,7 +56,7 @@ MUTATIONS = (
     Mutation("cold_start_moved", "accelerometer_only", {}, "survived"),
     Mutation("cold_start_moved", "premerlani", NO_OFFSET, "inclination within 6 deg for good"),
     Mutation("cold_start_no_gps", "premerlani", NO_YAW, "heading within 15 deg for good"),
-    Mutation("crosswind", "gyro_only", {}, "inclination error RMS"),
+    Mutation("crosswind", "gyro_only", {}, "survived"),
     Mutation("crosswind", "premerlani", NO_YAW, "heading error RMS"),
     Mutation("crosswind_strong", "premerlani", NO_YAW, "heading error RMS"),
     Mutation("faults", "accelerometer_only", {}, "survived"),
