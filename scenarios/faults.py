@@ -64,7 +64,7 @@ SCENARIO = Scenario(
             "inclination error, gyros spiking",
             "deg",
             over(inclination_error_deg, highest, at(30.0), at(50.0)),
-            35.0,  # 26.5, 8.5 left
+            35.0,  # 23.9, 11.1 left
         ),
         Check(
             "inclination error RMS after the spikes",
@@ -92,7 +92,7 @@ SCENARIO = Scenario(
             "inclination error, no numbers",
             "deg",
             over(inclination_error_deg, highest, NAN, at(117.0)),
-            25.0,  # 15.9, 9.1 left
+            25.0,  # 16.0, 9.0 left
         ),
         Check(
             "inclination error RMS after the silence",

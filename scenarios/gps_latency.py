@@ -117,8 +117,8 @@ SCENARIOS = (
     _late(
         "s_3",
         3.0,
-        _lost(15.0),  # 22.0, 7.0 left
-        _inclination(10.0),  # 6.6, 3.4 left
+        _lost(15.0),  # 23.7, 8.7 left
+        _inclination(10.0),  # 6.4, 3.6 left
         fails=True,
     ),
     _late(

@@ -80,7 +80,7 @@ SCENARIO = Scenario(
             "heading within 15 deg for good",
             "s",
             settling(heading_error_deg(), 15.0, OVER, end),
-            10.0,  # 5.6, 4.4 left
+            10.0,  # 5.4, 4.6 left
         ),
         Check(
             "inclination error RMS afterwards",

@@ -96,7 +96,7 @@ SCENARIO = Scenario(
     script=_script,
     checks=(
         SURVIVED,
-        _inclination(5.0),  # 3.6, 1.4 left
+        _inclination(5.0),  # 3.5, 1.5 left
         _recovered(RECOVERED_S),  # 1.5, 8.5 left
     ),
     milestones={"rolled out": lambda flight: [r.t_s for r in roll_outs(flight)]},
@@ -113,29 +113,29 @@ SCENARIOS = (
     SCENARIO,
     _at_bank(
         30.0,
-        _banked(30.0, 6.0),  # 11.9, 5.9 left
-        _least_height(HEIGHT_M - KEPT_M),  # 72.3, 7.3 left
-        _most_height(HEIGHT_M + KEPT_M),  # 86.4, 8.6 left
-        _inclination(6.0),  # 4.3, 1.7 left
-        _turning(8.0),  # 5.6, 2.4 left
+        _banked(30.0, 6.0),  # 6.6, 0.6 left
+        _least_height(HEIGHT_M - KEPT_M),  # 72.5, 7.5 left
+        _most_height(HEIGHT_M + KEPT_M),  # 86.5, 8.5 left
+        _inclination(6.0),  # 4.0, 2.0 left
+        _turning(8.0),  # 5.1, 2.9 left
         _recovered(RECOVERED_S),  # 1.4, 8.6 left
     ),
     _at_bank(
         45.0,
-        _banked(45.0, 4.0),  # 8.5, 4.5 left
-        _least_height(HEIGHT_M - KEPT_M),  # 70.6, 5.6 left
-        _most_height(HEIGHT_M + KEPT_M),  # 87.1, 7.9 left
-        _inclination(6.0),  # 4.5, 1.5 left
-        _turning(8.0),  # 6.1, 1.9 left
+        _banked(45.0, 4.0),  # 5.5, 1.5 left
+        _least_height(HEIGHT_M - KEPT_M),  # 71.4, 6.4 left
+        _most_height(HEIGHT_M + KEPT_M),  # 87.2, 7.8 left
+        _inclination(6.0),  # 4.4, 1.6 left
+        _turning(8.0),  # 5.8, 2.2 left
         _recovered(RECOVERED_S),  # 3.7, 6.3 left
     ),
     _at_bank(
         60.0,
-        _banked(60.0, 3.0),  # 4.9, 1.9 left
-        _least_height(HEIGHT_M - KEPT_M),  # 70.8, 5.8 left
-        _most_height(HEIGHT_M + KEPT_M),  # 86.2, 8.8 left
+        _banked(60.0, 3.0),  # 4.5, 1.5 left
+        _least_height(HEIGHT_M - KEPT_M),  # 71.0, 6.0 left
+        _most_height(HEIGHT_M + KEPT_M),  # 86.1, 8.9 left
         _inclination(5.0),  # 3.6, 1.4 left
-        _turning(8.0),  # 4.8, 3.2 left
-        _recovered(RECOVERED_S),  # 3.2, 6.8 left
+        _turning(8.0),  # 4.9, 3.1 left
+        _recovered(RECOVERED_S),  # 3.1, 6.9 left
     ),
 )
