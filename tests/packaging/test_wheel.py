@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.harness.registry import registered
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
 DATA = (".xml", ".toml", ".md", ".obj", ".glb")
@@ -93,8 +95,7 @@ def test_wheel_installed_lists_and_flies(installed: Path, tmp_path: Path) -> Non
     command = str(installed / "wingslevel")
     listed = call([command, "list", "--json", "-"], tmp_path)
     assert listed.returncode == 0, listed.stderr
-    scenarios = {path.stem for path in (ROOT / "scenarios").glob("[!_]*.py")}
-    assert set(json.loads(listed.stdout)["scenarios"]) == scenarios
+    assert set(json.loads(listed.stdout)["scenarios"]) == set(registered())
     flown = call([command, "fly", "hand_launch", "--duration", "5", "--json", "-"], tmp_path)
     assert flown.returncode in (0, 1), flown.stderr
     assert flown.stdout, flown.stderr
