@@ -202,6 +202,8 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
     if math.isfinite(asked.throttle) and s.mode == asked.mode and asked.radio and not in_hand:
         throttle = asked.throttle
     aileron, elevator, rudder, throttle = mix(moved[0], moved[1], moved[2], throttle, me.p.mixer)
+    if s.inverted:  # told as the bank that it is: the demand counts from lying on its back
+        bank -= math.copysign(math.pi, bank)
     return aileron, elevator, rudder, throttle, bank, pitch
 
 

@@ -117,6 +117,7 @@ class ActuatorCommand(NamedTuple):
 
     aileron, elevator, rudder : -1..1, sense of the rotation they cause: roll right, nose up, nose right
     throttle : 0..1    mode : the mode in force    bank_demand_rad, pitch_demand_rad : NaN where none is held
+    (upside down a bank beyond 90 degrees)
     """
 
     aileron: float

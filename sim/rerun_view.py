@@ -54,6 +54,21 @@ _CHASE_S = 1.5  # the chase view follows the path smoothed over about so long
 _LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
 _LANE_COLOURS: dict[str, dict[str, Colour]] = {
     "phase": {"held": (90, 95, 105), "thrown": (190, 140, 50), "flying": (45, 110, 125), "resting": (90, 95, 105)},
+    # By hand grey, held blue, led green; a failsafe is amber, and red where nobody knows the attitude.
+    "mode": {
+        "manual": (90, 95, 105),
+        "rate": (110, 105, 130),
+        "stabilise": (60, 95, 140),
+        "course": (45, 110, 90),
+        "return": (50, 125, 80),
+        "launch": (45, 110, 125),
+        "loiter": (70, 120, 60),
+        "waypoints": (60, 125, 100),
+        "circle": (190, 140, 50),
+        "glide": (170, 105, 40),
+        "level": (180, 60, 60),
+        "low": (200, 120, 60),
+    },
     "estimator": {"starting": (90, 95, 105), "good": (50, 125, 80), "poor": (180, 60, 60)},
 }
 

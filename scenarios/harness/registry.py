@@ -41,7 +41,7 @@ def matching(patterns: Iterable[str]) -> list[str]:
         if "*" in pattern or "?" in pattern:
             found = [name for name in registered() if fnmatchcase(name, pattern)]
             if not found:
-                raise ValueError(f"no scenario is called {pattern!r}: choose from {', '.join(registered())}")
+                raise ValueError(f"no scenario is called {pattern!r}: `wingslevel list` names all there are")
             names |= dict.fromkeys(found)
         else:
             names[pattern] = None

@@ -371,3 +371,9 @@ def test_open_viewer_serves_a_browser_on_the_loopback_address_until_terminated(f
     port = int(shown.url.split(":")[2].split("/")[0])
     with socket.socket() as s:
         assert s.connect_ex(("127.0.0.1", port)) != 0
+
+
+def test_lanes_have_a_colour_for_every_state():
+    """What is left out gets any colour: a mode as asked for in the red of a failure, or the other way round."""
+    for lane, (_, _, meaning) in rerun_view._LANES.items():
+        assert rerun_view._LANE_COLOURS[lane].keys() == {state.name.lower() for state in meaning}

@@ -149,6 +149,14 @@ def test_sailplane_any_height_wanted_glides_and_never_pulls(mode, height_m):
     assert glide_rad < 0.0
 
 
+def test_bank_demand_upside_down_is_told_as_the_bank_that_it_is():
+    """30 degrees asked for on its back are 150 to the left: what is recorded lies beside the true bank."""
+    on_its_back = Setpoint(Mode.STABILISE, bank_rad=math.radians(30.0), inverted=True)
+    command = DcmAutopilot().update(estimate(roll=math.radians(-150.0)), measurements(), on_its_back)
+    assert math.degrees(command.bank_demand_rad) == pytest.approx(-150.0, rel=0, abs=1e-9)
+    assert abs(command.aileron) < 0.1  # there already
+
+
 def test_sailplane_turns_by_rudder_within_its_own_bank_limit():
     """The set-point allows 60 degrees, the aeroplane not; right is right rudder, and there is no aileron."""
     sailplane = DcmAutopilot(aircraft="gentle_lady")
