@@ -157,6 +157,14 @@ def test_airspeed_wanted_is_the_one_asked_for_within_limits(asked_m_s, wanted_m_
     assert s["airspeed_wanted_m_s"] == CRUISE_M_S
 
 
+def test_airspeed_asked_for_last_does_not_hold_without_the_radio():
+    """Home at the speed that the wind needs: a slow one, asked for before, would never arrive."""
+    asked, s = np.zeros(1, _ASKED), state()
+    _write(Setpoint(Mode.COURSE, airspeed_m_s=9.0, radio=False), asked[0])
+    want_airspeed(asked[0], True, s, record()["energy"])
+    assert s["airspeed_wanted_m_s"] == CRUISE_M_S
+
+
 @pytest.mark.parametrize(
     ("height_m", "climb_m_s"), [(1000.0, 3.0), (52.0, 0.5), (50.0, 0.0), (48.0, -0.5), (0.0, -2.0)]
 )

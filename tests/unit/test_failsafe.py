@@ -28,7 +28,7 @@ class Aboard:
     def __init__(self, aircraft="endurance"):
         self.autopilot, self.row = DcmAutopilot(aircraft=aircraft), np.zeros(1, MEASURED_DTYPE)
         self.row["dt_s"], self.row["force_b_m_s2"] = DT_S, (0.0, 0.0, -9.8)
-        self.ticks, self.height_m, self.latency_s, self.numbers = 0, 60.0, 0.3, True
+        self.ticks, self.height_m, self.latency_s, self.numbers, self.ground_m_s = 0, 60.0, 0.3, True, 12.0
 
     def fly(self, setpoint, seconds, *, gps=True, estimate=None):
         """Commands of so many seconds; a fix every 0.2 s where there is a GPS."""
@@ -39,7 +39,7 @@ class Aboard:
             if self.row["gps_new"][0]:
                 self.row["gps_valid"], self.row["gps_t_s"] = 1, self.row["t_s"] - self.latency_s
                 self.row["gps_p_e_m"] = (200.0, 0.0, -self.height_m) if self.numbers else math.nan
-                self.row["gps_v_e_m_s"] = (12.0, 0.0, 0.0)
+                self.row["gps_v_e_m_s"] = (self.ground_m_s, 0.0, 0.0)
             measured = Measurements(self.row.copy(), 0)
             commands.append(self.autopilot.update(estimate or AttitudeEstimate(np.eye(3)), measured, setpoint))
             self.ticks += 1
@@ -201,6 +201,16 @@ def test_estimator_poor_for_want_of_fixes_is_left_to_the_gps_failsafe():
     aboard.latency_s = 12.0
     aboard.fly(asking(Mode.COURSE), 2.0)
     assert aboard.modes(asking(Mode.COURSE), 20.0, estimate=poor()) == [(Mode.COURSE, 20.0)]
+
+
+def test_estimator_poor_for_want_of_a_course_is_not_ill():
+    """Hardly moving over the ground against the wind there is no course: what misses one is POOR for that alone."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 5.0)
+    aboard.ground_m_s = P.course_speed_m_s - 1.0
+    assert aboard.modes(asking(Mode.COURSE), 20.0, estimate=poor()) == [(Mode.COURSE, 20.0)]
+    aboard.ground_m_s = P.course_speed_m_s + 1.0
+    assert aboard.modes(asking(Mode.COURSE), 20.0, estimate=poor())[-1][0] == Mode.LEVEL
 
 
 def test_estimator_that_rejects_a_sample_now_and_then_is_believed():
