@@ -42,7 +42,19 @@ from estimator.interface import Column, HeadingReference, ImuSample, Instrument,
 from estimator.jit import kernel
 from estimator.kernels import clip, wrap
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate
-from estimator.screening import FORCE_GOOD, G_M_S2, SCREEN, attitude_at_rest, offset_at_rest, screen, take_rate
+from estimator.screening import (
+    AIR,
+    FORCE_GOOD,
+    G_M_S2,
+    GPS,
+    MAG,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    refuse,
+    screen,
+    take_rate,
+)
 
 LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost
 SPIN_LIMIT_RAD_S = math.radians(20.0)  # no offset is learnt while turning faster
@@ -148,7 +160,7 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
             s.new_fix, s.new_course, s.fix_age_s, s.course_rad, s.speed_m_s = 1, 1, 0.0, course, speed
             s.course[0], s.course[1] = np.cos(course), np.sin(course)
         else:
-            s.rejected += 1
+            refuse(s, GPS)
     if row.mag_new and s.use_compass:
         m = row.mag_b_ut
         if 0.0 < m[0] * m[0] + m[1] * m[1] + m[2] * m[2] < 1e8:
@@ -156,12 +168,12 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
             for i in range(3):
                 s.field_b_ut[i] = m[i]
         else:
-            s.rejected += 1
+            refuse(s, MAG)
     if row.air_new:
-        if 0.0 <= row.airspeed_m_s < 1000.0:
-            s.airspeed_m_s, s.air_age_s = row.airspeed_m_s, 0.0
+        if abs(row.airspeed_m_s) < 1000.0:  # a pitot tube at rest reads a little below zero
+            s.airspeed_m_s, s.air_age_s = max(row.airspeed_m_s, 0.0), 0.0
         else:
-            s.rejected += 1
+            refuse(s, AIR)
 
 
 @kernel

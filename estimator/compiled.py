@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from estimator.interface import AttitudeEstimate, Column, Health, Instrument, Measurements, dtype_of
 from estimator.jit import inlined
+from estimator.screening import refusals
 
 BELIEF = (
     Column("R_eb", (3, 3), "estimated body-to-earth rotation"),
@@ -106,3 +107,8 @@ class Compiled:
     def rejected(self) -> int:
         """Ticks in which something was not believed, since the reset."""
         return int(self._state["rejected"][0])
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Samples not believed since the reset, by the instrument that they are of; those of none are left out."""
+        return refusals(self._state)

@@ -65,10 +65,12 @@ from estimator.rotation import integrate
 from estimator.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
+    GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
+    refuse,
     screen,
 )
 
@@ -223,7 +225,7 @@ def take_course(row, s):  # type: ignore[no-untyped-def]
         return
     x, y = row.gps_p_e_m[0], row.gps_p_e_m[1]
     if not (abs(x) < 1e6 and abs(y) < 1e6):
-        s.rejected += 1
+        refuse(s, GPS)
         return
     first_s, second_s = s.p_age_s[1] - s.p_age_s[0], s.p_age_s[0]
     # Two velocities between three positions, and their average.

@@ -57,10 +57,12 @@ from estimator.pi import feed_back
 from estimator.screening import (
     FORCE_RANGE_M_S2,
     G_M_S2,
+    GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
+    refuse,
     screen,
     take_rate,
 )
@@ -285,7 +287,7 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
     """All that happens at a GPS report."""
     v = row.gps_v_e_m_s
     if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
-        s.rejected += 1
+        refuse(s, GPS)
         return
     apply_corrections(s)
     before0, before1, before2 = s.at_fix_g[0], s.at_fix_g[1], s.at_fix_g[2]

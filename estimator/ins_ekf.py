@@ -73,14 +73,18 @@ from estimator.interface import Array, Column, HeadingReference, ImuSample, Inst
 from estimator.jit import kernel
 from estimator.rotation import level, renormalise
 from estimator.screening import (
+    AIR,
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     G_M_S2,
+    GPS,
     GYRO_GOOD,
     GYRO_RANGE_RAD_S,
+    MAG,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
+    refuse,
     screen,
 )
 
@@ -259,7 +263,7 @@ def attach_fix(row, s):  # type: ignore[no-untyped-def]
     """Put the fix of `row` beside the waiting sample in which it was true."""
     v = row.gps_v_e_m_s
     if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
-        s.rejected += 1
+        refuse(s, GPS)
         return
     late_s = s.gps_latency_s
     if s.gps_stamped and 0.0 <= row.t_s - row.gps_t_s <= LONGEST_STAMPED_S:
@@ -288,13 +292,13 @@ def attach_others(row, s):  # type: ignore[no-untyped-def]
             for j in range(3):
                 s.w_mag_b_ut[i, j] = m[j]
         else:
-            s.rejected += 1
+            refuse(s, MAG)
     if row.air_new and s.use_airspeed:
-        if 0.0 <= row.airspeed_m_s < 1000.0:
+        if abs(row.airspeed_m_s) < 1000.0:  # a pitot tube at rest reads a little below zero
             s.w_bits[i] |= HAS_AIR
-            s.w_airspeed_m_s[i] = row.airspeed_m_s
+            s.w_airspeed_m_s[i] = max(row.airspeed_m_s, 0.0)
         else:
-            s.rejected += 1
+            refuse(s, AIR)
 
 
 # The present

@@ -28,6 +28,7 @@ from estimator.ins_ekf_kernels import (
 from estimator.jit import kernel
 from estimator.kernels import wrap
 from estimator.rotation import level, renormalise
+from estimator.screening import AIR, GPS, MAG, refuse
 
 SIZE = 640  # samples that can wait: 12.8 s at 50 Hz, 3.2 s at 200 Hz
 PSEUDO_S = 0.2  # from one pseudo-measurement to the next
@@ -198,7 +199,7 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
     if believed == 3:
         s.fix_age_s = s.refusing_s = 0.0
         return
-    s.rejected += 1
+    refuse(s, GPS)
     s.refusing_s = max(s.refusing_s, 1e-9)
     if s.refusing_s > RESTART_S:
         restart(s)
@@ -223,7 +224,7 @@ def take_mag(s, i):  # type: ignore[no-untyped-def]
         innovation = wrap(s.declination_rad - magnetic_course(s, s.w_mag_b_ut[i]))
         s.aligned = 1
     if not fuse(s, innovation, s.magnetic_noise_rad**2, s.gate):
-        s.rejected += 1
+        refuse(s, MAG)
 
 
 @kernel
@@ -232,7 +233,7 @@ def take_airspeed(s, i):  # type: ignore[no-untyped-def]
     if s.seeded and s.aligned and s.w_airspeed_m_s[i] > SLOWEST_AIRSPEED_M_S:
         innovation = s.w_airspeed_m_s[i] - airspeed(s)
         if not fuse(s, innovation, s.airspeed_noise_m_s**2, s.gate):
-            s.rejected += 1
+            refuse(s, AIR)
 
 
 @kernel

@@ -17,6 +17,7 @@ import numpy as np
 
 from estimator.interface import Array, Column
 from estimator.jit import kernel
+from estimator.screening import MAG, refuse
 
 FIELD_RANGE_UT = 200.0  # the earth's field is 22 to 67 uT; the rest is room for iron
 _LEAST_READINGS = 9  # an ellipsoid about a known centre has six unknowns
@@ -136,7 +137,7 @@ def take_field(row, s):  # type: ignore[no-untyped-def]
         return False
     m, limit = row.mag_b_ut, s.field_range_ut
     if not (abs(m[0]) <= limit and abs(m[1]) <= limit and abs(m[2]) <= limit):  # NaN is not
-        s.rejected += 1
+        refuse(s, MAG)
         return False
     x, y, z = m[0] - s.hard_iron_b_ut[0], m[1] - s.hard_iron_b_ut[1], m[2] - s.hard_iron_b_ut[2]
     for i in range(3):

@@ -63,10 +63,12 @@ from estimator.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     G_M_S2,
+    GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
+    refuse,
     screen,
     take_rate,
 )
@@ -312,7 +314,7 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
         return
     course, speed, sink = row.gps_course_rad, row.gps_speed_m_s, row.gps_v_e_m_s[2]
     if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0 and abs(sink) < 1000.0):
-        s.rejected += 1
+        refuse(s, GPS)
         return
     carry_on(course, speed, sink, s)
     if s.estimate_wind:

@@ -24,10 +24,14 @@ from estimator.jit import kernel
 from estimator.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
+    GPS,
     GYRO_RANGE_RAD_S,
+    MAG,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
+    refusals,
+    refuse,
     screen,
     take_rate,
 )
@@ -69,11 +73,11 @@ def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped
         if WEAKEST_UT < np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) < STRONGEST_UT:  # NaN is not either
             good |= FIELD
         else:
-            s.rejected += 1
+            refuse(s, MAG)
     s.course_age_s += s.dt_s
     if uses_course and row.gps_new:
         if not (abs(row.gps_course_rad) < 100.0 and 0.0 <= row.gps_speed_m_s < 1000.0):
-            s.rejected += 1
+            refuse(s, GPS)
         elif row.gps_speed_m_s >= MIN_SPEED_M_S:
             s.course_rad, s.course_age_s = row.gps_course_rad, 0.0
     return good | COURSE if s.course_age_s <= FIX_LIFE_S else good
@@ -213,6 +217,11 @@ class Peer:
     def rejected(self) -> int:
         """Ticks in which something was not believed, since the reset."""
         return int(self._rejected[0])
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """Samples not believed since the reset, by the instrument that they are of."""
+        return refusals(self._state)
 
     def _theirs(self, R_eb: Array) -> Array:
         """Quaternion in the axes of the package."""

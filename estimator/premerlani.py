@@ -78,10 +78,12 @@ from estimator.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     G_M_S2,
+    GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
+    refuse,
     screen,
 )
 from estimator.wind import WIND_FILTER, learn_wind
@@ -213,7 +215,7 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
         if abs(row.gps_course_rad) < 100.0 and 0.0 <= row.gps_speed_m_s < 1000.0:
             believe_fix(row.gps_course_rad, row.gps_speed_m_s, s)
         else:
-            s.rejected += 1
+            refuse(s, GPS)
 
 
 @inlined

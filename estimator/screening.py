@@ -4,8 +4,10 @@ The state record of an estimator that uses this has the columns of `SCREEN` and 
 """
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.interface import Array, Column, ImuSample
 from estimator.jit import inlined
@@ -23,6 +25,10 @@ FORCE_RANGE_M_S2 = 17.0 * G_M_S2
 PASSED, GYRO_GOOD, FORCE_GOOD = 1, 2, 4  # bits of what `screen` answers: time passed, and what to believe
 ALL_GOOD = 7
 
+REFUSED = ("time", "gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+"""What a sample that is not believed is counted under, in the column `refused`."""
+TIME, GYRO, FORCE, GPS, MAG, AIR = range(len(REFUSED))
+
 SCREEN = (
     Column("gyro_range_rad_s", (), "a rate beyond this is no measurement"),
     Column("force_range_m_s2", (), "a specific force beyond this is no measurement"),
@@ -32,6 +38,7 @@ SCREEN = (
     Column("dt_s", (), "time that this tick accounts for"),
     Column("bad_s", (), "how long the gyro has been broken"),
     Column("rejected", (), "ticks in which something was not believed", integer=True),
+    Column("refused", (len(REFUSED),), "samples not believed, by what they are of: see REFUSED", integer=True),
 )
 
 
@@ -61,6 +68,13 @@ def _interval_s(row, s):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def refuse(s, what):  # type: ignore[no-untyped-def]
+    """Count a sample of the instrument `what` (an index of REFUSED) that is not believed."""
+    s.rejected += 1
+    s.refused[what] += 1
+
+
+@inlined
 def screen(row, s):  # type: ignore[no-untyped-def]
     """Judge the inertial sample of `row`, set ``s.dt_s``, count a rejection.
 
@@ -77,8 +91,14 @@ def screen(row, s):  # type: ignore[no-untyped-def]
         if _within(row.gyro_b_rad_s, s.gyro_range_rad_s):
             good |= GYRO_GOOD
             s.bad_s = 0.0
+        else:
+            s.refused[GYRO] += 1
         if _within(row.force_b_m_s2, s.force_range_m_s2):
             good |= FORCE_GOOD
+        else:
+            s.refused[FORCE] += 1
+    else:
+        s.refused[TIME] += 1
     if good != ALL_GOOD:
         s.rejected += 1
     return good
@@ -92,6 +112,11 @@ def take_rate(row, s, good):  # type: ignore[no-untyped-def]
             s.omega_b_rad_s[i] = row.gyro_b_rad_s[i] - s.gyro_bias_b_rad_s[i]
         elif s.bad_s > COAST_S:
             s.omega_b_rad_s[i] = 0.0
+
+
+def refusals(state: NDArray[Any]) -> dict[str, int]:
+    """Samples not believed, by the instrument that they are of, from a state record of shape (1,)."""
+    return {name: int(n) for name, n in zip(REFUSED, state["refused"][0], strict=True) if n}
 
 
 def offset_at_rest(sample: ImuSample) -> Array:

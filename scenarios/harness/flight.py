@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from estimator.instruments import Instruments, Known
 from estimator.interface import AttitudeEstimator
 from scenarios.harness.air_config import build_air
 from scenarios.harness.compass import with_compass
@@ -19,7 +20,7 @@ from scenarios.harness.config import (
 )
 from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, suited, with_params
+from scenarios.harness.plugins import equipped, heading_reference_of, load_autopilot
 from scenarios.harness.scenario import Scenario
 from sim.clock import Rates
 from sim.events import events_of_faults
@@ -149,7 +150,6 @@ def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 def estimator_of(config: FlightConfig) -> AttitudeEstimator:
-    """The estimator by name, told what suits its instruments, its parameters changed as the configuration says."""
-    estimator = load_estimator(config.estimator)
-    params = {**suited(estimator, config.suits), **config.estimator_params}
-    return with_params(estimator, config.estimator, params)
+    """The estimator by name, its parameters changed as the configuration says."""
+    known = Instruments({name: Known(value, "set") for name, value in config.suits.items()})
+    return equipped(config.estimator, known, config.estimator_params).estimator

@@ -7,8 +7,10 @@ A name is one of
 ``package.module:Class``   anything that can be imported, also from the working directory
 ``path/to/file.py:Class``  a file
 
-The class is called anew for each flight, without arguments (an autopilot's is given the ``heading_reference`` of the
-estimator and the name of its ``aircraft`` where it asks for them).  Only ``update`` is required of it.
+The class is called anew for each flight.  Its constructor is given what it asks for by name: ``instruments``, the
+record of what is known of those aboard, or single properties of it, such as ``gps_latency_s``; an autopilot's also the
+``heading_reference`` of the estimator and the name of its ``aircraft``.  Fields of a dataclass ``params`` that are named
+like a property are set to it.  Only ``update`` is required.
 """
 
 import importlib
@@ -17,7 +19,7 @@ import inspect
 import sys
 from collections import ChainMap
 from collections.abc import Mapping
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -25,6 +27,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
+from estimator.instruments import Instruments, Known
 from sim.params import changed
 from sim.params import near_misses as near_misses
 
@@ -63,8 +66,10 @@ def autopilots() -> dict[str, str]:
     return _offered(_AUTOPILOT)
 
 
-def load_estimator(spec: str) -> "AttitudeEstimator":
+def load_estimator(spec: str, **offered: Any) -> "AttitudeEstimator":
     """A new estimator by name, ``module:Class`` or ``file.py:Class``.
+
+    offered : arguments for a constructor that asks for them by name
 
     Raises
     ------
@@ -72,26 +77,53 @@ def load_estimator(spec: str) -> "AttitudeEstimator":
         In one line: nothing of that name (with the near misses), code that cannot be imported or constructed, no
         ``update(measurements)``, or a ``heading_reference`` that is neither "course" nor "nose".
     """
-    estimator = _load(_ESTIMATOR, spec)
+    estimator = _load(_ESTIMATOR, spec, **offered)
     reference = heading_reference_of(estimator)
     if reference not in ("course", "nose"):
         raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
     return estimator
 
 
-def with_params(estimator: "AttitudeEstimator", spec: str, values: Mapping[str, Any]) -> "AttitudeEstimator":
-    """A new estimator like `estimator`, which `spec` names, with `values` of its parameters; itself where none are.
+class Equipped(NamedTuple):
+    """An estimator that knows its instruments, and what it was given of them, by name."""
+
+    estimator: "AttitudeEstimator"
+    known: dict[str, Known]
+
+
+def equipped(spec: str, instruments: Instruments | None = None, settings: Mapping[str, Any] | None = None) -> Equipped:
+    """A new estimator by name that is given what is known of the instruments, with parameters changed.
+
+    settings : its parameters by dotted names, as the user sets them: they win over `instruments`
 
     Raises
     ------
-    ValueError      in one line: it has no parameters, none of that name, or a value that it refuses
+    ValueError      in one line: as `load_estimator`; or it has no parameters, none of that name, or refuses a value
     """
-    if not values:
-        return estimator
+    settings = settings or {}
+    base = instruments if instruments is not None else Instruments()
+    aboard = base.changed({name: value for name, value in settings.items() if name in base})
+    offered = {name: known.value for name, known in aboard.given.items()}
+    asked = _arguments(_find(_ESTIMATOR, spec))
+    estimator = load_estimator(spec, instruments=aboard, **offered)
+    known = {name: aboard[name] for name in aboard if name in asked or "instruments" in asked}
     before = getattr(estimator, "params", None)
-    if not is_dataclass(before):
-        raise ValueError(f"estimator {spec!r} has no parameters (a dataclass in its attribute params)")
-    after = changed(before, values, f"estimator {spec}")
+    if is_dataclass(before):
+        of_params = {f.name for f in fields(before)} & set(aboard)
+        known |= {name: aboard[name] for name in aboard if name in of_params}
+        values = {name: value for name, value in offered.items() if name in of_params} | dict(settings)
+        if values:
+            estimator = _with_params(estimator, spec, values)
+    elif unheard := [name for name in settings if name not in asked]:
+        raise ValueError(
+            f"estimator {spec!r} has no parameter {unheard[0]!r}, neither in a dataclass params nor in its constructor"
+        )
+    return Equipped(estimator, known)
+
+
+def _with_params(estimator: "AttitudeEstimator", spec: str, values: Mapping[str, Any]) -> "AttitudeEstimator":
+    """A new estimator like `estimator` with `values` of its parameters; ValueError for one that it refuses."""
+    after = changed(estimator.params, values, f"estimator {spec}")  # type: ignore[attr-defined]
     maker: Any = type(estimator)
     try:
         return maker(after)
@@ -99,10 +131,10 @@ def with_params(estimator: "AttitudeEstimator", spec: str, values: Mapping[str, 
         raise ValueError(f"estimator {spec!r}: its class must take its params as an argument: {error}") from error
 
 
-def suited(estimator: object, suits: Mapping[str, Any]) -> dict[str, Any]:
-    """Those of `suits`, what is known of the instruments aboard, that `estimator` has parameters for."""
-    params = getattr(estimator, "params", None)
-    return {name: value for name, value in suits.items() if hasattr(params, name)}
+def learnt(estimator: object, known: Mapping[str, Known]) -> dict[str, Known]:
+    """`known` with the properties that `estimator` has learnt in flight, as its ``learnt`` tells, in their place."""
+    found: Mapping[str, Any] = getattr(estimator, "learnt", None) or {}
+    return {**known, **{name: Known(value, "learnt") for name, value in found.items()}}
 
 
 def heading_reference_of(estimator: object) -> "HeadingReference":
@@ -144,11 +176,16 @@ def _load(kind: _Kind, spec: str, **offered: Any) -> Any:
 
 
 def _made(maker: Any, offered: dict[str, Any]) -> Any:
-    try:
-        asked = set(inspect.signature(maker).parameters)
-    except (TypeError, ValueError):
-        asked = set()  # compiled code that does not tell
+    asked = _arguments(maker)
     return maker(**{name: value for name, value in offered.items() if name in asked})
+
+
+def _arguments(maker: Any) -> set[str]:
+    """Names of the arguments with which `maker` can be called."""
+    try:
+        return set(inspect.signature(maker).parameters)
+    except (TypeError, ValueError):
+        return set()  # compiled code that does not tell
 
 
 def _find(kind: _Kind, spec: str) -> Any:

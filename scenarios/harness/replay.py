@@ -11,12 +11,13 @@ a time to settle.  Against firmware every row counts: two runs of one algorithm 
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.instruments import Instruments, Known
 from estimator.interface import Array, AttitudeEstimator, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
 from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
@@ -24,7 +25,7 @@ from scenarios.harness import console
 from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import heading_reference_of, load_estimator, suited, with_params
+from scenarios.harness.plugins import Equipped, equipped, heading_reference_of, learnt
 from sim.acceptance import FlightCodeFailed, estimate_of
 from sim.events import events_of
 from sim.log import Event, Flight, Log, Outcome, Phase
@@ -76,6 +77,7 @@ class Replayed:
     flown : shape (N,), its estimates        first : the first row that it saw
     ns_per_update : of the run; NaN where it failed        rejected : ticks in which it did not believe something,
     None where it does not say               failure : one line, empty where it did not fail
+    known : what it was given of the instruments, or has learnt      refused : samples not believed, by instrument
     """
 
     estimator: str
@@ -86,27 +88,36 @@ class Replayed:
     rejected: int | None
     scores: Mapping[str, float]
     failure: str = ""
+    known: Mapping[str, Known] = field(default_factory=dict)
+    refused: Mapping[str, int] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """The numbers, named with their units; None where there is nothing to measure."""
         numbers = {**self.scores, "ns_per_update": self.ns_per_update}
         plain: dict[str, Any] = {name: v if math.isfinite(v) else None for name, v in numbers.items()}
         failure = {"failure": self.failure} if self.failure else {}
-        return {**plain, "rejected": self.rejected, "heading_reference": self.heading_reference, **failure}
+        return {
+            **plain,
+            "rejected": self.rejected,
+            "refused": dict(self.refused),
+            "heading_reference": self.heading_reference,
+            "known": {name: known.to_json() for name, known in self.known.items()},
+            **failure,
+        }
 
 
-def make(spec: str, params: Mapping[str, Any]) -> AttitudeEstimator:
-    """The estimator of that name with some of its parameters changed.
+def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None = None) -> Equipped:
+    """The estimator of that name, with what is known of the instruments and some of its parameters changed.
 
     Raises
     ------
     ValueError      one line: no such estimator or parameter; the oracle, for which no log holds the truth
     """
-    estimator = load_estimator(spec)
-    if isinstance(estimator, Oracle):
-        raise ValueError("the oracle reads the truth from a simulator: it cannot be replayed over a log")
     values = {name.removeprefix("estimator_params."): literal(value) for name, value in params.items()}
-    return with_params(estimator, spec, values)
+    made = equipped(spec, instruments, values)
+    if isinstance(made.estimator, Oracle):
+        raise ValueError("the oracle reads the truth from a simulator: it cannot be replayed over a log")
+    return made
 
 
 def replay(
@@ -118,14 +129,14 @@ def replay(
 ) -> Replayed:
     """Run the estimator `spec` over `log` and score it.
 
-    params : by name; what the log says of its instruments (`RecordedLog.suits`) holds where they do not
+    params : by name; what the log says of its instruments (`RecordedLog.known`) holds where they do not
 
     Raises
     ------
     ValueError      one line: no such estimator or parameter, or a calibration longer than the log
     """
     window = window or Window()
-    estimator = make(spec, {**suited(load_estimator(spec), log.suits), **(params or {})})
+    estimator, known = make(spec, params or {}, Instruments(log.known))
     n = _calibration(log, window)
     on_ground = at_rest(log.rows[:n]) if n else None
     first = n if on_ground is not None else 0
@@ -149,6 +160,8 @@ def replay(
         getattr(estimator, "rejected", None),
         scores,
         failure,
+        learnt(estimator, known),
+        getattr(estimator, "refused", {}),
     )
 
 

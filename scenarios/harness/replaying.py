@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
+from estimator.instruments import Instruments
 from scenarios.harness import console, logs, viewing
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, make, replay
@@ -46,7 +47,8 @@ class Told:
             "reference": self.log.reference.name if self.log.reference else None,
             "reference_kind": self.log.reference.kind if self.log.reference else None,
             "repairs": list(self.log.repairs),
-            "suits": dict(self.log.suits),
+            "known": Instruments(self.log.known).to_json(),
+            "ledger": self.log.ledger.to_json(),
             "judged_s": self.judged_s,
         }
         each = {r.estimator: r.to_json() | {"recording": str(self.folders[r.estimator])} for r in self.replays}
@@ -119,9 +121,6 @@ def tell(told: Told) -> None:
     out.print(Text(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}"), soft_wrap=True)
     for line in log.repairs:
         out.print(Text(f"repaired    {line}", "yellow"), soft_wrap=True)
-    if log.suits:
-        suits = ", ".join(f"{name}={_short(value)}" for name, value in log.suits.items())
-        out.print(Text(f"set to suit {suits} (where an estimator has it, and --set does not say)"), soft_wrap=True)
     if log.reference is None:
         out.print(Text("no attitude in it to score against: --reference FILE"), soft_wrap=True)
     else:

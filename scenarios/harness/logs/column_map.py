@@ -12,7 +12,7 @@ where the column counts the other way, and a unit where it is not SI::
     wx = "gyro.x deg/s"
     az = "-force.z g"
 
-    [suits]  # what is known of the instruments, by the names that parameters of estimators have
+    [instruments]  # what is known of them, by the names of `estimator.instruments.PROPERTIES`
     gps_latency_s = 0.2
 
 Without a map, columns are known by the names in use (`automatic`), a unit at the end of a name included:
@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimator.instruments import Known
 from estimator.screening import G_M_S2
 from scenarios.harness.logs.recorded import LogError
 from scenarios.harness.plugins import near_misses
@@ -112,7 +113,7 @@ class ColumnMap:
     delimiter: str = ","
     skip_lines: int = 0
     struct: str = ""
-    suits: Mapping[str, float] = field(default_factory=dict)
+    known: Mapping[str, Known] = field(default_factory=dict)
     name: str = "automatic names"
 
 
@@ -133,7 +134,7 @@ def load(spec: str | Path) -> ColumnMap:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise LogError(f"{path}: {error}") from error
-    odd = sorted(set(data) - {"columns", "delimiter", "skip_lines", "struct", "suits"})
+    odd = sorted(set(data) - {"columns", "delimiter", "skip_lines", "struct", "instruments", "suits"})
     entries = data.get("columns")
     if odd or not isinstance(entries, dict):
         raise LogError(f"{path}: {f'unknown entry {odd[0]!r}' if odd else 'no table [columns]'}")
@@ -141,14 +142,21 @@ def load(spec: str | Path) -> ColumnMap:
     if not (isinstance(delimiter, str) and len(delimiter) == 1 and isinstance(skip_lines, int) and skip_lines >= 0):
         raise LogError(f"{path}: delimiter must be one character and skip_lines a whole number, zero or more")
     columns = {column: _meaning(str(text), f"{path}: {column} = {text!r}") for column, text in entries.items()}
-    suits = data.get("suits", {})
-    if not (isinstance(suits, dict) and all(isinstance(v, int | float) for v in suits.values())):
-        raise LogError(f"{path}: [suits] must hold numbers by the names of parameters")
+    known = {**data.get("suits", {}), **data.get("instruments", {})}  # [suits] is the older name
+    if not all(isinstance(v, int | float) for v in known.values()):
+        raise LogError(f"{path}: [instruments] must hold numbers by the names of properties")
     twice = [m.quantity for m in columns.values()]
     for quantity in twice:
         if twice.count(quantity) > 1:
             raise LogError(f"{path}: {quantity} is the meaning of two columns")
-    return ColumnMap(columns, delimiter, skip_lines, str(struct), suits, path.stem)
+    return ColumnMap(
+        columns,
+        delimiter,
+        skip_lines,
+        str(struct),
+        {n: Known(v, "log", path.name) for n, v in known.items()},
+        path.stem,
+    )
 
 
 def _meaning(text: str, where: str) -> Meaning:

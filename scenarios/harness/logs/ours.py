@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from estimator.instruments import Known
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from sim import recording
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
@@ -32,5 +33,5 @@ def read(path: Path) -> RecordedLog:
         float(setting(flight.manifest, "launch_longitude_deg", LONGITUDE_DEG)),
     )
     name = path.name if path.is_dir() else path.parent.name
-    suits = flight.manifest.get("config", {}).get("suits", {})
-    return RecordedLog(rows, name or path.name, instruments, reference, (), place, suits)
+    known = {n: Known(k["value"], k["source"]) for n, k in flight.manifest.get("known", {}).items()}
+    return RecordedLog(rows, name or path.name, instruments, reference, (), place, known)

@@ -7,7 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.instruments import Known
 from estimator.interface import Array
+from scenarios.harness.logs.ledger import Ledger
 
 
 class LogError(ValueError):
@@ -40,7 +42,9 @@ class RecordedLog:
     name : of the file            instruments : those that the log has
     reference : or None           repairs : what was repaired and how often, a line each
     place : latitude and longitude of the origin of positions, degrees, where known
-    suits : what is known of the instruments aboard, as parameters of estimators, ``{"gps_latency_s": 0.2}``
+    known : what the log says of the instruments aboard, by the names of `estimator.instruments.PROPERTIES`, and of
+            parameters that single estimators have
+    ledger : what became of everything that the file holds
     """
 
     rows: NDArray[Any]
@@ -49,4 +53,5 @@ class RecordedLog:
     reference: Reference | None = None
     repairs: tuple[str, ...] = ()
     place: tuple[float, float] | None = None
-    suits: Mapping[str, Any] = field(default_factory=dict)
+    known: Mapping[str, Known] = field(default_factory=dict)
+    ledger: Ledger = field(default_factory=Ledger)

@@ -6,7 +6,7 @@ field in counts where a sample arrived, airspeed.  The attitudes (``*_truth``, o
 are the nine elements of the body-to-earth rotation, row by row.
 
 What the input was made with, and how an original was set for the output that it is compared with, is known by the
-names of the files, and goes to the estimators that have such a parameter (`RecordedLog.suits`).
+names of the files, and goes to the estimators that have such a parameter (`RecordedLog.known`).
 """
 
 import csv
@@ -19,6 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
@@ -26,7 +27,7 @@ COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about 
 LEAST_FIX = 3  # a fix of three dimensions
 INPUT = ("t", "dt", "gx", "gy", "gz", "ax", "ay", "az", "gps_new", "gps_vn", "gps_ve", "gps_vd", "gps_fix",
          "mag_new", "mx", "my", "mz", "airspeed", "gps_n", "gps_e", "gps_d")  # fmt: skip
-SUITS = {  # by the name of the set: its receiver does not filter, but it may be late; E100 has none
+KNOWN = {  # by the name of the set: its receiver does not filter, but it may be late; E100 has none
     "A50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.0},
     "C50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.4},
     "C40": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.25},
@@ -84,16 +85,16 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     if attitudes is not None and "_ap2013_" in attitudes.name:
         for column, step in AP2013_STEPS.items():
             rows[column] = step * np.rint(rows[column] / step)
-    return RecordedLog(rows, path.name, tuple(instruments), attitudes, suits=_suits(path, attitudes))
+    return RecordedLog(rows, path.name, tuple(instruments), attitudes, known=_known(path, attitudes))
 
 
-def _suits(path: Path, attitudes: Reference | None) -> dict[str, Any]:
+def _known(path: Path, attitudes: Reference | None) -> dict[str, Known]:
     """What is known of the set of `path`, and of the original that printed the `attitudes`."""
-    suits: dict[str, Any] = dict(SUITS.get(path.name.partition("_")[0], {}))
+    known: dict[str, Any] = dict(KNOWN.get(path.name.partition("_")[0], {}))
     for end, settings in SETTINGS.items():
         if attitudes is not None and attitudes.name.endswith(end):
-            suits |= settings
-    return suits
+            known |= settings
+    return {name: Known(value, "log", "name of the file") for name, value in known.items()}
 
 
 def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | None:

@@ -74,7 +74,7 @@ def recorded(columns: Mapping[str, Array], meanings: ColumnMap, source: checks.S
     reference = None if R_eb is None else Reference(R_eb, "filter", f"attitude in {source.path.name}")
     has = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
     instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if rows[new].any()))
-    log = RecordedLog(rows, source.path.name, instruments, reference, tuple(repairs), place, meanings.suits)
+    log = RecordedLog(rows, source.path.name, instruments, reference, tuple(repairs), place, meanings.known)
     return checks.judged(log, source)
 
 

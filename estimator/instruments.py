@@ -1,0 +1,129 @@
+"""What is known of the instruments aboard, and how it is known.
+
+One record, `Instruments`, is built for each flight or log: from the data sheets of the sensor suite, from what a log
+says of itself, and from what the user sets.  Every estimator and autopilot receives those properties for which it has
+a parameter of the same name; one whose constructor takes an argument ``instruments`` receives the whole record.
+
+>>> instruments.value("gps_latency_s")       # 0.3, or None where nobody knows
+>>> instruments["gps_latency_s"].source      # "data sheet"
+
+A property is a data-sheet value or a setting.  It never depends on the errors drawn for one flight.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Literal, NamedTuple
+
+Source = Literal["set", "data sheet", "log", "learnt", "assumed", "withheld", "unknown"]
+
+
+class Property(NamedTuple):
+    """One property: its meaning, and what is assumed where nothing is known; None where nothing can be."""
+
+    meaning: str
+    assumed: float | bool | None = None
+
+
+PROPERTIES: Mapping[str, Property] = {
+    "gps_filter_s": Property("time constant of the receiver's velocity filter; 0 is none", 0.0),
+    "gps_latency_s": Property("from the moment a fix is true to its arrival", 0.3),
+    "gps_latency_sigma_s": Property("standard deviation of that latency", 0.15),
+    "gps_stamped": Property("whether a fix carries the time at which it was true", False),
+    "gps_vertical_velocity": Property("whether the receiver reports a vertical velocity; else it reads 0"),
+    "gps_rate_hz": Property("fixes per second"),
+    "gps_noise_m_s": Property("standard deviation of each velocity component of a fix"),
+    "gyro_full_scale_rad_s": Property("largest rate that the gyro can read"),
+    "gyro_noise_rad_s_sqrt_hz": Property("one-sided noise density of the gyro, quantisation and vibration included"),
+    "gyro_bias_sigma_rad_s": Property("standard deviation of the gyro bias left after the calibration at power-up"),
+    "gyro_gain_sigma": Property("standard deviation of the relative gain error of a gyro axis"),
+    "gyro_cross_axis": Property("standard deviation of the sensitivity of a gyro axis to another"),
+    "force_full_scale_m_s2": Property("largest specific force that the accelerometer can read"),
+    "force_noise_m_s2_sqrt_hz": Property("one-sided noise density of the accelerometer, likewise"),
+    "force_bias_sigma_m_s2": Property("standard deviation of the accelerometer bias"),
+    "imu_rate_hz": Property("inertial samples per second"),
+    "declination_rad": Property("magnetic north from true north, positive to the east"),
+    "use_magnetometer": Property("whether a magnetometer is fitted and calibrated"),
+    "use_airspeed": Property("whether an airspeed sensor is fitted and used"),
+}
+"""Every property: name, as parameters of estimators and autopilots spell it -> what it means."""
+
+SIGMA_KNOWN_S = 0.02  # standard deviation of a latency that a data sheet or a log gives
+
+
+class Known(NamedTuple):
+    """A property's value, and where it comes from; `origin` names the part, log parameter or map."""
+
+    value: Any
+    source: Source
+    origin: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """As plain data."""
+        return {"value": self.value, "source": self.source}
+
+
+class Instruments(Mapping[str, Known]):
+    """What is known of the instruments aboard; see the module.  Every name of `PROPERTIES` is in it.
+
+    Parameters
+    ----------
+    known : what is known, by name; a name beside `PROPERTIES` is a parameter of single estimators
+    settings : what the user set, by name: it wins over everything else
+    withheld : names of properties that nobody is told
+    """
+
+    def __init__(
+        self, known: Mapping[str, Known] | None = None, settings: Mapping[str, Any] | None = None,
+        withheld: Iterable[str] = (),
+    ) -> None:  # fmt: skip
+        record = {name: _without_knowledge(name) for name in PROPERTIES} | dict(known or {})
+        record |= {name: _without_knowledge(name, withheld=True) for name in withheld}
+        record |= {name: Known(value, "set") for name, value in (settings or {}).items()}
+        _agree(record)
+        self._record = record
+
+    def __getitem__(self, name: str) -> Known:
+        return self._record[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._record)
+
+    def __len__(self) -> int:
+        return len(self._record)
+
+    def value(self, name: str, default: Any = None) -> Any:
+        """The value of a property, `default` where it has none."""
+        value = self._record[name].value if name in self._record else None
+        return default if value is None else value
+
+    def changed(self, settings: Mapping[str, Any] | None = None, withheld: Iterable[str] = ()) -> "Instruments":
+        """The same record with more set or withheld."""
+        return Instruments(self._record, settings, withheld)
+
+    @property
+    def given(self) -> dict[str, Known]:
+        """The properties that have a value, by name."""
+        return {name: known for name, known in self._record.items() if known.value is not None}
+
+    def to_json(self) -> dict[str, dict[str, Any]]:
+        """As plain data: name -> value and source."""
+        return {name: known.to_json() for name, known in self._record.items()}
+
+
+def _without_knowledge(name: str, *, withheld: bool = False) -> Known:
+    """The entry of a property that nobody knows, or is told."""
+    assumed = PROPERTIES[name].assumed if name in PROPERTIES else None
+    if withheld:
+        return Known(assumed, "withheld")
+    return Known(assumed, "unknown" if assumed is None else "assumed")
+
+
+def _agree(record: dict[str, Known]) -> None:
+    """Make what follows from other entries follow: a latency that is set holds, whatever stamps say."""
+    latency, stamped, sigma = record["gps_latency_s"], record["gps_stamped"], record["gps_latency_sigma_s"]
+    if latency.source == "set" and stamped.source != "set":
+        record["gps_stamped"] = Known(False, "set", "gps_latency_s is set")
+    if sigma.source in ("assumed", "withheld"):
+        if latency.source == "set":
+            record["gps_latency_sigma_s"] = Known(0.0, "set", "gps_latency_s is set")
+        elif latency.source in ("data sheet", "log"):
+            record["gps_latency_sigma_s"] = Known(SIGMA_KNOWN_S, latency.source, latency.origin)

@@ -1,0 +1,71 @@
+"""What became of everything that a log holds: how much of each stream was read, used, and left out, and why.
+
+A stream is ``imu``, ``gps``, ``magnetometer``, ``airspeed``, ``barometer`` or ``reference``.  Of each one
+
+    read = used + everything left out
+
+holds: a reader counts what it reads, whoever leaves something out says why, and what estimators are given at the end
+is counted on its own: `Entry.agrees` compares the two.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+STREAMS = ("imu", "gps", "magnetometer", "airspeed", "barometer", "reference")
+
+
+@dataclass(slots=True)
+class Entry:
+    """One stream: messages or samples in the file, those that estimators are given, and the others by reason."""
+
+    read: int = 0
+    used: int = 0
+    left_out: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether everything read is accounted for."""
+        return self.read == self.used + sum(self.left_out.values())
+
+
+class Ledger(Mapping[str, Entry]):
+    """The books of one log, by stream; a stream that was never read has no entry."""
+
+    def __init__(self) -> None:
+        self._entries: dict[str, Entry] = {}
+
+    def __getitem__(self, stream: str) -> Entry:
+        return self._entries[stream]
+
+    def __iter__(self) -> Any:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def read(self, stream: str, n: int) -> None:
+        """`n` messages or samples of the `stream` were found in the file."""
+        self._entry(stream).read += n
+
+    def leave_out(self, stream: str, n: int, reason: str) -> None:
+        """`n` of those read do not reach the estimators; the `reason` in a few words, none where `n` is 0."""
+        if n:
+            left_out = self._entry(stream).left_out
+            left_out[reason] = left_out.get(reason, 0) + n
+
+    def use(self, stream: str, n: int) -> None:
+        """`n` of those read reach the estimators."""
+        self._entry(stream).used += n
+
+    def to_json(self) -> dict[str, dict[str, Any]]:
+        """As plain data: stream -> read, used, left_out."""
+        return {
+            name: {"read": entry.read, "used": entry.used, "left_out": dict(entry.left_out)}
+            for name, entry in self._entries.items()
+        }
+
+    def _entry(self, stream: str) -> Entry:
+        if stream not in STREAMS:
+            raise ValueError(f"stream {stream!r}: must be one of {', '.join(STREAMS)}")
+        return self._entries.setdefault(stream, Entry())
