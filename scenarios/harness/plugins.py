@@ -8,9 +8,9 @@ A name is one of
 ``path/to/file.py:Class``  a file
 
 The class is called anew for each flight.  Its constructor is given what it asks for by name: ``instruments``, the
-record of what is known of those aboard, or single properties of it, such as ``gps_latency_s``; an autopilot's also the
-``heading_reference`` of the estimator and the name of its ``aircraft``.  Fields of a dataclass ``params`` that are named
-like a property are set to it.  Only ``update`` is required.
+record of what is known of those aboard, or single properties of it, such as ``gps_latency_s``; an autopilot's also
+the ``heading_reference`` of the estimator and the name of its ``aircraft``.  Fields of a dataclass ``params`` that are
+named like a property are set to it.  Only ``update`` is required.
 """
 
 import importlib
