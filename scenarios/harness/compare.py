@@ -16,6 +16,7 @@ import numpy as np
 from rich.text import Text
 
 from estimator import ESTIMATORS
+from estimator.instruments import Known, to_json
 from estimator.interface import Array, HeadingReference, Measurements
 from scenarios.harness import console
 from scenarios.harness.config import FlightConfig
@@ -90,6 +91,18 @@ class Entrant:
     cost: Cost | None = None
 
     @property
+    def known(self) -> dict[str, Known]:
+        """What it was given of the instruments; of what it learnt, the median over its flights."""
+        if not self.flights:
+            return {}
+        each = [flown.verdict.known for flown in self.flights]
+        values = {name: [k[name].value for k in each if k[name].source == "learnt"] for name in each[0]}
+        return {
+            name: Known(float(np.median(values[name])), "learnt") if values[name] else entry
+            for name, entry in each[0].items()
+        }
+
+    @property
     def survived(self) -> int:
         """Flights that lasted as long as planned."""
         return sum(f.verdict.outcome == Outcome.COMPLETED for f in self.flights)
@@ -116,6 +129,7 @@ class Entrant:
         return {
             "estimator": self.name,
             "given": list(self.given),
+            "known": to_json(self.known),
             "heading_reference": self.heading_reference,
             "flights": len(self.flights),
             "survived": self.survived,
@@ -329,6 +343,7 @@ def tell(comparison: Comparison) -> None:
             "dim",
         )
     )
+    console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
         for flown in entrant.flights:
             v = flown.verdict

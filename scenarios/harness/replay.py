@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.instruments import Instruments, Known
+from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import Array, AttitudeEstimator, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
 from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
@@ -101,7 +101,7 @@ class Replayed:
             "rejected": self.rejected,
             "refused": dict(self.refused),
             "heading_reference": self.heading_reference,
-            "known": {name: known.to_json() for name, known in self.known.items()},
+            "known": to_json(self.known),
             **failure,
         }
 
@@ -115,7 +115,7 @@ def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None =
     """
     values = {name.removeprefix("estimator_params."): literal(value) for name, value in params.items()}
     made = equipped(spec, instruments, values)
-    if isinstance(made.estimator, Oracle):
+    if isinstance(made.code, Oracle):
         raise ValueError("the oracle reads the truth from a simulator: it cannot be replayed over a log")
     return made
 

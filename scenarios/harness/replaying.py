@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
-from estimator.instruments import Instruments
+from estimator.instruments import Instruments, to_json
 from scenarios.harness import console, logs, viewing
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, make, replay
@@ -47,7 +47,7 @@ class Told:
             "reference": self.log.reference.name if self.log.reference else None,
             "reference_kind": self.log.reference.kind if self.log.reference else None,
             "repairs": list(self.log.repairs),
-            "known": Instruments(self.log.known).to_json(),
+            "known": to_json(Instruments(self.log.known)),
             "ledger": self.log.ledger.to_json(),
             "judged_s": self.judged_s,
         }
@@ -127,9 +127,11 @@ def tell(told: Told) -> None:
         out.print(Text(f"against     {log.reference.name}, {told.judged_s:.1f} s of it judged"), soft_wrap=True)
     rows = [_row(replayed) for replayed in told.replays]
     out.print(console.table("differences from the reference, degrees", _HEADINGS, rows))
+    console.print_known({replayed.estimator: replayed.known for replayed in told.replays})
     for replayed in told.replays:
-        if replayed.rejected:
-            out.print(Text(f"{replayed.estimator} rejected something in {replayed.rejected} rows"), soft_wrap=True)
+        if replayed.refused:
+            refused = ", ".join(f"{n} {name}" for name, n in replayed.refused.items())
+            out.print(Text(f"not believed by {replayed.estimator}: {refused} samples"), soft_wrap=True)
         if replayed.failure:
             out.print(Text(f"{replayed.estimator} failed: {replayed.failure}", "bold red"), soft_wrap=True)
     for folder in told.folders.values():
