@@ -24,7 +24,7 @@ from scenarios.harness.fitted import suite_params
 from scenarios.harness.flight import fly_config, fly_scenario
 from scenarios.harness.gate import fly_each
 from scenarios.harness.metrics import Series, heading_error_deg, inclination_error_deg, rms
-from scenarios.harness.plugins import PluginError, heading_reference_of, load_estimator
+from scenarios.harness.plugins import PluginError, heading_reference_of, load_estimator, shared_settings, without
 from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
@@ -33,6 +33,7 @@ from sim.log import Outcome
 
 LETTERS = {"gyro": "G", "accelerometer": "A", "gps": "P", "magnetometer": "M", "airspeed": "V"}
 TIMED_S, TIMED_REPEATS, TIMED_MOST_NS = 4.0, 7, 1_000_000_000
+PREFIX = "estimator_params."
 _UNKNOWN = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")  # of a class that does not say
 
 
@@ -149,6 +150,7 @@ class Comparison:
     config: FlightConfig
     seeds: tuple[int, ...]
     entrants: tuple[Entrant, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def whole(self) -> bool:
@@ -172,6 +174,7 @@ class Comparison:
             "scenario": self.scenario.name,
             "seeds": list(self.seeds),
             "estimators": [e.to_json() for e in self.entrants],
+            "notes": list(self.notes),
             "flights": verdicts,
         } | ({} if self.whole else {"interrupted": True})
 
@@ -208,7 +211,8 @@ def checks_text(entrant: Entrant) -> str:
 class Plan:
     """What is to be flown: everything that it names is there.
 
-    named : how the scenario was named (a file may hold it)      references, given : by the estimator's name
+    named : how the scenario was named (a file may hold it)      changes, references, given : by the estimator's name
+    notes : what is set for some of the estimators alone, a line each
     """
 
     named: str
@@ -216,7 +220,8 @@ class Plan:
     config: FlightConfig
     names: tuple[str, ...]
     seeds: tuple[int, ...]
-    changes: Mapping[str, Any]
+    changes: Mapping[str, Mapping[str, Any]]
+    notes: tuple[str, ...]
     references: Mapping[str, HeadingReference]
     given: Mapping[str, tuple[str, ...]]
 
@@ -232,12 +237,17 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
         if name in changes:
             raise ValueError(f"--set {name}={changes[name]}: name what is to be flown with {instead}")
     names = tuple(dict.fromkeys(estimators)) or tuple(name for name in ESTIMATORS if _can_be_loaded(name))
-    configs = [prepared(scenario, {**changes, "estimator": name})[1] for name in names]
+    settings = {key.removeprefix(PREFIX): value for key, value in changes.items() if key.startswith(PREFIX)}
+    shared = {key: value for key, value in changes.items() if not key.startswith(PREFIX)}
+    of_each = shared_settings(names, settings)
+    changes_of = {name: shared | {PREFIX + key: value for key, value in of_each[name].items()} for name in names}
+    configs = [prepared(scenario, {**changes_of[name], "estimator": name})[1] for name in names]
     made = {name: load_estimator(name) for name in names}
     console.warn_of_faults(scenario, configs[0])
     references = {name: heading_reference_of(estimator) for name, estimator in made.items()}
     instruments = {name: given(estimator, configs[0]) for name, estimator in made.items()}
-    return Plan(scenario, find(scenario), configs[0], names, tuple(seeds), changes, references, instruments)
+    notes = tuple(without(of_each, settings))
+    return Plan(scenario, find(scenario), configs[0], names, tuple(seeds), changes_of, notes, references, instruments)
 
 
 def _can_be_loaded(name: str) -> bool:
@@ -256,7 +266,7 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None]) -> Compar
     Ctrl-C, or a worker process that was killed, leaves flights out: the comparison is then of those finished.
     """
     # Seed by seed, so that an interruption leaves each estimator about as many flights as the others.
-    tasks = [Task(plan.named, seed, name, plan.changes) for seed in plan.seeds for name in plan.names]
+    tasks = [Task(plan.named, seed, name, plan.changes[name]) for seed in plan.seeds for name in plan.names]
     done = fly_each(tasks, workers, advance, lambda flown: flown.verdict.outcome == Outcome.INTERRUPTED)
     failed = {tasks[i].estimator for i in done if done[i].verdict.outcome == Outcome.ESTIMATOR_FAILED}
     costs = _costs(plan, failed) if len(done) == len(tasks) else {}
@@ -270,7 +280,7 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None]) -> Compar
                 pooled[0] if pooled else None, costs.get(name),
             )
         )  # fmt: skip
-    return Comparison(plan.scenario, plan.config, plan.seeds, tuple(entrants))
+    return Comparison(plan.scenario, plan.config, plan.seeds, tuple(entrants), plan.notes)
 
 
 def given(estimator: object, config: FlightConfig) -> tuple[str, ...]:
@@ -343,6 +353,8 @@ def tell(comparison: Comparison) -> None:
             "dim",
         )
     )
+    for line in comparison.notes:
+        out.print(Text(f"set         {line}"), soft_wrap=True)
     console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
         for flown in entrant.flights:

@@ -142,14 +142,13 @@ def print_known(known: Mapping[str, Mapping[str, "Known"]]) -> None:
     lines: dict[str, list[str]] = {}
     for estimator, entries in known.items():
         for name, entry in entries.items():
-            if len(known) == 1:
+            if entry.value is None:
+                lines.setdefault(entry.source, []).append(name)
+            elif len(known) == 1:
                 lines.setdefault(entry.source, []).append(f"{name} {_value(entry)}")
             else:
                 lines.setdefault(f"{name} {_value(entry)} ({entry.source})", []).append(estimator)
-    if len(known) == 1:
-        lines = {f"{source}:": texts for source, texts in sorted(lines.items())}
-    else:
-        lines = {f"{what}:": lines[what] for what in sorted(lines)}
+    lines = {f"{what}:": list(dict.fromkeys(lines[what])) for what in sorted(lines)}
     indent = 12 * " "
     for i, (what, texts) in enumerate(lines.items()):
         wrapped = textwrap.wrap(
@@ -161,8 +160,6 @@ def print_known(known: Mapping[str, Mapping[str, "Known"]]) -> None:
 
 def _value(entry: "Known") -> str:
     """A property's value in a few letters."""
-    if entry.value is None:
-        return "unknown"
     if isinstance(entry.value, bool):
         return "yes" if entry.value else "no"
     return f"{entry.value:.4g}" if isinstance(entry.value, int | float) else str(entry.value)

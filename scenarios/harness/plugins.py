@@ -18,7 +18,7 @@ import importlib.util
 import inspect
 import sys
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -108,6 +108,57 @@ def equipped(
     made = _equipped(_ESTIMATOR, spec, instruments or Instruments(), settings or {})
     _check_reference(spec, made.code)
     return made
+
+
+def parameters_of(spec: str) -> set[str]:
+    """Names of what can be set of the estimator `spec`: dotted fields of its ``params``, arguments of its constructor.
+
+    Raises
+    ------
+    PluginError      as for `load_estimator`
+    """
+    params = getattr(load_estimator(spec), "params", None)
+    named = set(dotted_fields(params)) if is_dataclass(params) else set()
+    return named | (_arguments(_find(_ESTIMATOR, spec)) - {"params", "instruments", "self"})
+
+
+def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """`settings` for each of several estimators: those that it has, by the estimator's spec.
+
+    A name may begin with that of one estimator, ``premerlani.gps_latency_s``: it is for that one alone.
+
+    Raises
+    ------
+    ValueError      one line: a parameter that none of them has
+    """
+    short = {spec: spec.rpartition(":")[2] for spec in specs}
+    of_each: dict[str, dict[str, Any]] = {spec: {} for spec in specs}
+    has = {spec: parameters_of(spec) for spec in specs} if settings else {}
+    for key, value in settings.items():
+        head, _, rest = key.partition(".")
+        if rest and head in short.values():
+            of_each[next(spec for spec in specs if short[spec] == head)][rest] = value
+            continue
+        takers = [spec for spec in specs if key in has[spec]]
+        if not takers:
+            known = sorted(set().union(*has.values()))
+            who = f"estimator {specs[0]}" if len(specs) == 1 else f"any of {', '.join(specs)}"
+            hint = near_misses(key, known) if known else "they have none"
+            raise ValueError(f"unknown parameter {key!r} of {who}: {hint}")
+        for spec in takers:
+            of_each[spec][key] = value
+    return of_each
+
+
+def without(of_each: Mapping[str, Mapping[str, Any]], settings: Mapping[str, Any]) -> list[str]:
+    """A line for each of the `settings` that some of the estimators do not have, from `shared_settings`."""
+    lines = []
+    for key in settings:
+        takers = [spec for spec, own in of_each.items() if key in own]
+        if takers and len(takers) < len(of_each):
+            others = ", ".join(spec for spec in of_each if spec not in takers)
+            lines.append(f"{key} is set for {', '.join(takers)}; without that parameter: {others}")
+    return lines
 
 
 def equipped_autopilot(
