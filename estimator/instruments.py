@@ -79,7 +79,7 @@ def property_value(name: str, value: Any) -> float | bool:
 
 def property_names(names: Iterable[str]) -> tuple[str, ...]:
     """`names`, each of a property; ``all`` stands for all of them.  ValueError for one that is none."""
-    wanted = tuple(name.strip() for name in names)
+    wanted = tuple(filter(None, (name.strip() for name in names)))
     if wanted == ("all",):
         return tuple(PROPERTIES)
     for name in wanted:

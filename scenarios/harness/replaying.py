@@ -40,8 +40,9 @@ class Told:
 
     @property
     def exit_code(self) -> int:
-        """1 where an estimator failed, or nothing could be judged."""
-        return 1 if self.not_judged or any(r.failure for r in self.replays) else 0
+        """1 where an estimator failed, or nothing of the reference could be judged."""
+        nothing = self.log.reference is not None and self.not_judged
+        return 1 if nothing or any(r.failure for r in self.replays) else 0
 
     def to_json(self) -> dict[str, Any]:
         """Every number by its estimator; with one estimator at the top too."""
@@ -139,7 +140,8 @@ def tell(told: Told) -> None:
         if replayed.failure:
             out.print(Text(f"{replayed.estimator} failed: {replayed.failure}", "bold red"), soft_wrap=True)
     if told.not_judged:
-        out.print(Text(f"nothing judged: {told.not_judged}", "bold red"), soft_wrap=True)
+        style = "bold red" if log.reference is not None else "yellow"
+        out.print(Text(f"nothing judged: {told.not_judged}", style), soft_wrap=True)
     for folder in told.folders.values():
         out.print(Text(f"recording   {folder}"), soft_wrap=True)
 
