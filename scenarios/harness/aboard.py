@@ -9,13 +9,20 @@ parameters have a ``calibration`` is given what the readings of its own magnetom
 
 import math
 from dataclasses import asdict
-from typing import Any
+from typing import Any, NamedTuple
 
 from estimator.instruments import Instruments, Known
 from estimator.magnetometer import Calibration
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import load_estimator
+from scenarios.harness.plugins import (
+    Equipped,
+    Maker,
+    equipped,
+    equipped_autopilot,
+    heading_reference_of,
+    load_estimator,
+)
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
 from sim.power_up import field_on_turn_table
 from sim.sensors.known import data_sheets
@@ -31,6 +38,26 @@ def instruments_of(config: FlightConfig) -> Instruments:
     if config.turn_table:
         known["use_magnetometer"] = Known(True, "set", "turn_table")
     return Instruments(known, config.instruments, config.withheld)
+
+
+class FlightCode(NamedTuple):
+    """The estimator and the autopilot of a flight, new, each with what it was given of the instruments."""
+
+    estimator: Equipped
+    autopilot: Equipped
+
+
+def flight_code(config: FlightConfig, maker: Maker | None = None) -> FlightCode:
+    """Estimator and autopilot of the resolved `config`; `maker` makes the estimator where it is given.
+
+    Raises
+    ------
+    ValueError      one line: flight code that is not there, or a parameter that it has not or refuses
+    """
+    aboard = instruments_of(config)
+    estimator = equipped(maker or config.estimator, aboard, config.estimator_params)
+    reference = heading_reference_of(estimator.code)
+    return FlightCode(estimator, equipped_autopilot(config.autopilot, reference, config.aircraft, aboard))
 
 
 def with_calibration(config: FlightConfig) -> FlightConfig:

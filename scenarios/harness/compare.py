@@ -16,15 +16,23 @@ import numpy as np
 from rich.text import Text
 
 from estimator import ESTIMATORS
-from estimator.instruments import Known, to_json
+from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import Array, HeadingReference, Measurements
 from scenarios.harness import console
+from scenarios.harness.aboard import flight_code, instruments_of
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.flight import fly_config, fly_scenario
 from scenarios.harness.gate import fly_each
 from scenarios.harness.metrics import Series, heading_error_deg, inclination_error_deg, rms
-from scenarios.harness.plugins import PluginError, heading_reference_of, load_estimator, shared_settings, without
+from scenarios.harness.plugins import (
+    PluginError,
+    equipped,
+    heading_reference_of,
+    load_estimator,
+    shared_settings,
+    without,
+)
 from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
@@ -242,7 +250,7 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     of_each = shared_settings(names, settings)
     changes_of = {name: shared | {PREFIX + key: value for key, value in of_each[name].items()} for name in names}
     configs = [prepared(scenario, {**changes_of[name], "estimator": name})[1] for name in names]
-    made = {name: load_estimator(name) for name in names}
+    made = {name: flight_code(of_it).estimator.code for name, of_it in zip(names, configs, strict=True)}
     console.warn_of_faults(scenario, configs[0])
     references = {name: heading_reference_of(estimator) for name, estimator in made.items()}
     instruments = {name: given(estimator, configs[0]) for name, estimator in made.items()}
@@ -296,12 +304,13 @@ def _costs(plan: Plan, failed: Container[str]) -> dict[str, Cost]:
     config = plan.config.model_copy(update=another)
     rows = fly_config(plan.scenario, config).log.measured
     # The oracle answers in a flight alone.
-    return {name: cost(name, rows) for name in plan.names if name not in failed and name != "oracle"}
+    timed = (name for name in plan.names if name not in failed and name != "oracle")
+    return {name: cost(name, rows, instruments_of(config)) for name in timed}
 
 
-def cost(name: str, rows: np.ndarray) -> Cost:
+def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
     """Least time of several passes over `rows`, per row; a slow one is timed over fewer of them."""
-    estimator, inputs = load_estimator(name), [Measurements(rows, k) for k in range(len(rows))]
+    estimator, inputs = equipped(name, instruments).code, [Measurements(rows, k) for k in range(len(rows))]
 
     def stream() -> None:
         update = estimator.update

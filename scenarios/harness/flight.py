@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from estimator.instruments import to_json
-from scenarios.harness.aboard import instruments_of, with_calibration
+from scenarios.harness.aboard import flight_code, instruments_of, with_calibration
 from scenarios.harness.air_config import build_air
 from scenarios.harness.config import (
     BenchStart,
@@ -19,7 +19,7 @@ from scenarios.harness.config import (
 )
 from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import Maker, equipped, equipped_autopilot, heading_reference_of, learnt
+from scenarios.harness.plugins import Maker, learnt
 from scenarios.harness.scenario import Scenario
 from sim.clock import Rates
 from sim.events import events_of_faults
@@ -75,9 +75,7 @@ def fly_config(
     """
     config = resolve(config) if maker is not None else with_calibration(resolve(config))
     rates = config.rates.build()
-    aboard = instruments_of(config)
-    estimator, known = equipped(maker or config.estimator, aboard, config.estimator_params)
-    pilot, _ = equipped_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft, aboard)
+    (estimator, known), (pilot, _) = flight_code(config, maker)
     script = scenario.script(config)
     plant = plant_of(config, rates)
     faults = [parse_fault(fault) for fault in config.faults]
@@ -96,7 +94,7 @@ def fly_config(
             "scenario": scenario.name,
             "seed": config.seed,
             "config": config.model_dump(mode="json"),
-            "known": to_json(aboard),
+            "known": to_json(instruments_of(config)),
         },
         watch=watch,
     )
