@@ -25,6 +25,7 @@ class Property(NamedTuple):
     assumed: float | bool | None = None
 
 
+# Assumed is a present-day receiver, and a present-day inertial unit of 2000 deg/s and 16 g.
 PROPERTIES: Mapping[str, Property] = {
     "gps_filter_s": Property("time constant of the receiver's velocity filter; 0 is none", 0.0),
     "gps_latency_s": Property("from the moment a fix is true to its arrival", 0.3),
@@ -33,12 +34,12 @@ PROPERTIES: Mapping[str, Property] = {
     "gps_vertical_velocity": Property("whether the receiver reports a vertical velocity; else it reads 0"),
     "gps_rate_hz": Property("fixes per second"),
     "gps_noise_m_s": Property("standard deviation of each velocity component of a fix"),
-    "gyro_full_scale_rad_s": Property("largest rate that the gyro can read"),
+    "gyro_full_scale_rad_s": Property("largest rate that the gyro can read", 34.9),
     "gyro_noise_rad_s_sqrt_hz": Property("one-sided noise density of the gyro, quantisation and vibration included"),
     "gyro_bias_sigma_rad_s": Property("standard deviation of the gyro bias left after the calibration at power-up"),
     "gyro_gain_sigma": Property("standard deviation of the relative gain error of a gyro axis"),
     "gyro_cross_axis": Property("standard deviation of the sensitivity of a gyro axis to another"),
-    "force_full_scale_m_s2": Property("largest specific force that the accelerometer can read"),
+    "force_full_scale_m_s2": Property("largest specific force that the accelerometer can read", 156.9),
     "force_noise_m_s2_sqrt_hz": Property("one-sided noise density of the accelerometer, likewise"),
     "force_bias_sigma_m_s2": Property("standard deviation of the accelerometer bias"),
     "imu_rate_hz": Property("inertial samples per second"),
