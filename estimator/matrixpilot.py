@@ -108,6 +108,8 @@ class MatrixPilotParams:
     calibrate_gain : bool      learn the gyros' gain while spinning, within +-10 %
     pitch_error_limit : float  largest pitch error that is believed, of gravity; for launches.  inf turns it off
     min_speed_m_s : float      slowest ground speed at which a course means anything
+    gps_vertical_velocity : bool  whether the receiver reports one; without (NMEA), the firmware takes the change of the
+                               reported height over the interval between two reports
     fixed_point : bool         the 16-bit arithmetic of the firmware
     gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
     """
@@ -125,6 +127,7 @@ class MatrixPilotParams:
     calibrate_gain: bool = True
     pitch_error_limit: float = 0.25
     min_speed_m_s: float = 1.5
+    gps_vertical_velocity: bool = True
     fixed_point: bool = False
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S
     force_range_m_s2: float = FORCE_RANGE_M_S2
@@ -166,6 +169,7 @@ _STATE = (
     Column("fixes", (), "reports in unbroken succession, up to two", integer=True),
     Column("fix_age_s", (), "time since the last report"),
     Column("report", (3,), "course [rad], ground speed and sink rate [m/s] of the last report"),
+    Column("down_m", (), "height of the last report, positive down, where it takes the place of a sink rate"),
     Column("v_e_m_s", (3,), "velocity over the ground, carried on to the present"),
     Column("airspeed_m_s", (), "length of that less the wind"),
     Column("forward_m_s2", (), "change of airspeed between the last two reports"),
@@ -312,10 +316,14 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
         s.yaw_b[0] = s.yaw_b[1] = s.yaw_b[2] = 0.0
     if not row.gps_new:
         return
-    course, speed, sink = row.gps_course_rad, row.gps_speed_m_s, row.gps_v_e_m_s[2]
-    if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0 and abs(sink) < 1000.0):
+    course, speed, sink, down = row.gps_course_rad, row.gps_speed_m_s, row.gps_v_e_m_s[2], row.gps_p_e_m[2]
+    vertical = abs(sink) < 1000.0 if s.gps_vertical_velocity else abs(down) < 1e6
+    if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0 and vertical):
         refuse(s, GPS)
         return
+    if not s.gps_vertical_velocity:
+        sink = (down - s.down_m) / s.fix_age_s if s.fixes > 0 and s.fix_age_s > 0.0 else 0.0
+        s.down_m = down
     carry_on(course, speed, sink, s)
     if s.estimate_wind:
         learn_wind(s)

@@ -61,6 +61,9 @@ class _Ahrs(Keeping):
         self._q = q
         self._make()
 
+    def _turn(self, q: Array) -> None:
+        self._q = q
+
     def _make(self) -> None:
         raise NotImplementedError
 
@@ -166,6 +169,7 @@ class Vqf(Keeping):
     """VQF of Laidig and Seel, from the package vqf: 6D, and 9D once a magnetometer has been heard twice."""
 
     _earth, _body = EAST_NORTH_UP, LEFT_UP
+    _finds_heading = True
     params: VqfParams
 
     def __init__(self, params: VqfParams | None = None) -> None:
@@ -259,6 +263,9 @@ class Imufusion(Peer):
         self._filter, self._told_interval = self._fusion.Ahrs(), False
         if settled:
             self._filter.skip_startup()  # else it pulls hard for its first seconds
+        self._filter.set_quaternion(q)
+
+    def _turn(self, q: Array) -> None:
         self._filter.set_quaternion(q)
 
     def _set(self, sample_hz: float) -> None:

@@ -81,6 +81,7 @@ from estimator.screening import (
     GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
+    airspeed_came,
     attitude_at_rest,
     offset_at_rest,
     refuse,
@@ -114,7 +115,7 @@ class PremerlaniParams:
     clip_m_s2 : float          an accelerometer axis that reads so much is clipped: a count less than its full scale;
                                inf where that is not known
     find_clip : bool           take the largest reading of an axis for its full scale once it comes a second time
-    airspeed : bool            use the airspeed of a sensor in Eqn 25 while there is one
+    use_airspeed : bool        use the airspeed of a sensor in Eqn 25 while there is one
     turn_speed : bool          learn the speed of Eqn 25 in level turns; good in wind
     learn_wind : bool          learn the wind in turns, for the reference of Eqn 22 and the speed of Eqn 25; the
                                heading then converges to the nose.  Needs `rotate_history`
@@ -136,7 +137,7 @@ class PremerlaniParams:
     launch_gate: float = 0.2
     clip_m_s2: float = math.inf
     find_clip: bool = False
-    airspeed: bool = True
+    use_airspeed: bool = True
     turn_speed: bool = False
     learn_wind: bool = False
     min_speed_m_s: float = 3.0
@@ -202,7 +203,7 @@ STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + LAG + _PARAMS + _STATE)
 def take_air(row, s):  # type: ignore[no-untyped-def]
     """Take the airspeed of an air-data sample that arrived."""
     s.air_age_s += s.dt_s
-    if row.air_new and s.airspeed and 0.0 < row.airspeed_m_s < 1000.0:
+    if s.use_airspeed and airspeed_came(row, s) and row.airspeed_m_s > 0.0:
         s.airspeed_m_s = row.airspeed_m_s
         s.air_age_s = 0.0
 

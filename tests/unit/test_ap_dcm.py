@@ -111,12 +111,12 @@ def test_declination_turns_the_compass():
     assert heading_error_rad(run(rows, fly_forward=False)["R_eb"][-1], truth[-1]) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_use_compass_off_takes_the_course():
+def test_use_magnetometer_off_takes_the_course():
     """In 4 m/s of crosswind nose and course are 15 degrees apart; without compass the heading is the course."""
     rows, truth = straight(20, wind_e_m_s=(0.0, 4.0, 0.0), compass=True)
     crab = np.degrees(np.arctan2(4.0, 15.0))
     by_compass = heading_error_rad(run(rows)["R_eb"][-1], truth[-1])
-    by_course = heading_error_rad(run(rows, use_compass=False)["R_eb"][-1], truth[-1])
+    by_course = heading_error_rad(run(rows, use_magnetometer=False)["R_eb"][-1], truth[-1])
     assert np.degrees(by_compass) == pytest.approx(0.0, abs=0.5)
     assert np.degrees(by_course) == pytest.approx(crab, abs=0.5)
 
@@ -258,8 +258,8 @@ def test_quirks_can_be_typed_and_the_original_takes_settings():
     assert ApDcmParams(quirks="JULY_2013").quirks == JULY_2013
     assert ApDcmParams(quirks="").quirks == frozenset()
     assert ApDcm2013().params == ApDcmParams(quirks=JULY_2013)
-    assert make("ap_dcm_2013", {"kp": "0.2"}).params == ApDcmParams(quirks=JULY_2013, kp=0.2)
-    assert make("ap_dcm", {"quirks": "vertical_clip"}).params.quirks == {Quirk.VERTICAL_CLIP}
+    assert make("ap_dcm_2013", {"kp": "0.2"}).estimator.params == ApDcmParams(quirks=JULY_2013, kp=0.2)
+    assert make("ap_dcm", {"quirks": "vertical_clip"}).estimator.params.quirks == {Quirk.VERTICAL_CLIP}
 
 
 @pytest.mark.parametrize(
