@@ -17,13 +17,17 @@ peer_imufusion_9d  imufusion, `update`                    north-east-down       
 None of them knows of centrifugal acceleration, of speed, or of wind.  Without a magnetometer the heading of the
 first three is that of the gyros.
 
+All begin with the heading of the first field that can be believed, or of the first course: their corrections would take
+minutes to find it from north.  VQF takes the whole of the first field that it is given itself.
+
 Peculiarities of the packages
 -----------------------------
 *ahrs 0.4* returns the attitude uncorrected where the gyro reads exactly zero on all three axes.
 
 *imufusion 1.3* accepts ``AhrsSettings(convention=...)`` and ignores it; set as an attribute it counts.  Its external
 heading is spread over a body that rolls and does not pitch: at the pitch theta it settles where
-``tan(yaw) = tan(heading) / cos(theta)``.  It computes in single precision, and its state can neither be read nor
+``tan(yaw) = tan(heading) / cos(theta)``.  ``update_no_magnetometer`` sets the heading to zero again and again in its
+first 3 s; ``update`` with a field of zero is the same without that.  It computes in single precision, and its state can neither be read nor
 set: these two have no `snapshot`.
 
 *vqf 2.1* is told one sample interval, and one of the magnetometer, at its construction: those of the first sample,
@@ -48,7 +52,7 @@ from estimator.interface import Array, HeadingReference, Instrument
 from estimator.peer import EAST_NORTH_UP, LEFT_UP, NORTH_WEST_UP, Heard, Keeping, Peer, PeerParams, package
 from estimator.screening import G_M_S2
 
-NO_FORCE = np.zeros(3)
+NO_FORCE, NO_FIELD = np.zeros(3), np.zeros(3)
 SHORTEST_S = 5e-4  # sample interval that a package is told at least
 
 
@@ -289,7 +293,7 @@ class Imufusion(Peer):
 
     def _give(self, gyro_deg_s: Array, force_g: Array, heard: Heard) -> None:
         if heard.course_rad is None:
-            self._filter.update_no_magnetometer(gyro_deg_s, force_g)
+            self._filter.update(gyro_deg_s, force_g, NO_FIELD)
         else:
             self._filter.update_external_heading(gyro_deg_s, force_g, math.degrees(heard.course_rad))
 
@@ -302,7 +306,7 @@ class Imufusion9D(Imufusion):
 
     def _give(self, gyro_deg_s: Array, force_g: Array, heard: Heard) -> None:
         if heard.field_ut is None:
-            self._filter.update_no_magnetometer(gyro_deg_s, force_g)
+            self._filter.update(gyro_deg_s, force_g, NO_FIELD)
         else:
             self._magnetic = True
             self._filter.update(gyro_deg_s, force_g, heard.field_ut)
