@@ -26,9 +26,9 @@ Peculiarities of the packages
 
 *imufusion 1.3* accepts ``AhrsSettings(convention=...)`` and ignores it; set as an attribute it counts.  Its external
 heading is spread over a body that rolls and does not pitch: at the pitch theta it settles where
-``tan(yaw) = tan(heading) / cos(theta)``.  ``update_no_magnetometer`` sets the heading to zero again and again in its
-first 3 s; ``update`` with a field of zero is the same without that.  It computes in single precision, and its state can neither be read nor
-set: these two have no `snapshot`.
+``tan(yaw) = tan(heading) / cos(theta)``.  ``update_no_magnetometer`` sets the heading back to zero at every call of its
+first 3 s; ``update`` with a field of zero is the same without that.  It computes in single precision, and its state can
+neither be read nor set: these two have no `snapshot`.
 
 *vqf 2.1* is told one sample interval, and one of the magnetometer, at its construction: those of the first sample,
 and between the first two of the magnetometer.  Where samples were lost the one that arrived is given as often as it

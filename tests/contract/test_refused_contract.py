@@ -142,7 +142,7 @@ def test_unknown_time_stamps_of_fixes_change_nothing(made):
 
 
 def test_fix_lost_again_is_survived(made):
-    """A log in which ``gps_valid`` goes back to 0, its columns to zero, and comes back: no refusal, finite attitudes."""
+    """A log in which ``gps_valid`` goes back to 0, its columns too, and comes back: no refusal, finite attitudes."""
     rows = steady_flight()
     gone = rows[80:120]
     for column in (*GPS_COLUMNS, "gps_new", "gps_valid"):

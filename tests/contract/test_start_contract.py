@@ -21,7 +21,7 @@ HEADINGS_DEG = (-160.0, -50.0, 75.0, 179.0)
 SPOILT_UT = {"nan": (np.nan, 5.0, 40.0), "overflow": (-4096 / 13.0, 5.0, 40.0), "dead": (0.0, 0.0, 0.0)}
 
 
-# Madgwick's correction has one size, 0.041 rad/s x 0.02 s = 0.05 degrees, and dances round the goal; about a steep field
+# Madgwick's correction has one size, 0.041 rad/s x 0.02 s = 0.05 degrees, and dances round the goal; with a steep field
 # that is three times as much of heading.
 MOST_DEG = 0.2
 

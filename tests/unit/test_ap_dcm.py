@@ -1,6 +1,7 @@
 """`ap_dcm` on prescribed motion: what each option and each quirk does, and that nothing takes it off the rotations."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from estimator.ap_dcm import JULY_2013, STATE_DTYPE, ApDcm, ApDcm2013, ApDcmParams, Quirk, spin_gain
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
+from scenarios.harness.plugins import equipped
 from scenarios.harness.replay import make
 
 G_M_S2 = 9.80665
@@ -119,6 +121,21 @@ def test_use_magnetometer_off_takes_the_course():
     by_course = heading_error_rad(run(rows, use_magnetometer=False)["R_eb"][-1], truth[-1])
     assert np.degrees(by_compass) == pytest.approx(0.0, abs=0.5)
     assert np.degrees(by_course) == pytest.approx(crab, abs=0.5)
+
+
+@pytest.mark.parametrize(("fitted", "reference"), [(True, "nose"), (False, "course"), (None, "course")])
+@pytest.mark.parametrize("cls", [ApDcm, ApDcm2013])
+def test_heading_reference_is_the_nose_where_a_magnetometer_is_known_to_be_fitted(cls, fitted, reference):
+    """It is judged by it: by the nose with a compass, by the course without one and where nobody knows."""
+    assert cls(replace(cls().params, use_magnetometer=fitted)).heading_reference == reference
+
+
+@pytest.mark.parametrize("value", [0.0, False, 1.0, True])
+def test_use_magnetometer_as_a_record_or_a_command_line_has_it(value):
+    """Numbers for truth values: what is known of the instruments comes from files as well."""
+    estimator = equipped("ap_dcm", settings={"use_magnetometer": value}).estimator
+    assert estimator.params.use_magnetometer is bool(value)
+    assert estimator.snapshot()["use_magnetometer"][0] == int(value)
 
 
 def test_without_gps_tilt_comes_back_with_the_gain():
