@@ -43,6 +43,7 @@ from estimator.jit import kernel
 from estimator.kernels import clip, wrap
 from estimator.magnetometer import believable
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate
+from estimator.rotation import renormalise_exactly as renormalise_exactly
 from estimator.screening import (
     FORCE_GOOD,
     G_M_S2,
@@ -126,27 +127,6 @@ _STATE = (
     Column("wind_s", (), "when that was; before any, long ago"),
 )
 STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + _PARAMS + _STATE)
-
-
-@kernel
-def renormalise_exactly(R_eb):  # type: ignore[no-untyped-def]
-    """Bring the matrix back to a rotation, in place, each row by its exact length (Eqns 2.4-2.6); False if hopeless."""
-    error = R_eb[0, 0] * R_eb[1, 0] + R_eb[0, 1] * R_eb[1, 1] + R_eb[0, 2] * R_eb[1, 2]
-    for j in range(3):
-        x, y = R_eb[0, j], R_eb[1, j]
-        R_eb[0, j] = x - 0.5 * error * y  # Eqn 2.4
-        R_eb[1, j] = y - 0.5 * error * x
-    R_eb[2, 0] = R_eb[0, 1] * R_eb[1, 2] - R_eb[0, 2] * R_eb[1, 1]  # Eqn 2.5
-    R_eb[2, 1] = R_eb[0, 2] * R_eb[1, 0] - R_eb[0, 0] * R_eb[1, 2]
-    R_eb[2, 2] = R_eb[0, 0] * R_eb[1, 1] - R_eb[0, 1] * R_eb[1, 0]
-    for i in range(3):
-        length = np.sqrt(R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2)
-        if not 1e-6 < length < 1e6:
-            return False
-        scale = 1.0 / length
-        for j in range(3):
-            R_eb[i, j] *= scale  # Eqn 2.6
-    return True
 
 
 @kernel

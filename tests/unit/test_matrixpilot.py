@@ -168,27 +168,27 @@ def test_yaw_meets_the_velocity_through_the_air_once_the_wind_is_known():
     assert heading_rad(without.replay(rows)["R_eb"][-1]) == pytest.approx(course, rel=0, abs=math.radians(1.0))
 
 
-def test_receiver_without_vertical_velocity_has_its_sink_rate_from_the_heights():
+def test_climb_from_height_is_the_change_between_two_reports():
     """Heights 0.5 m lower at every report, 4 Hz: 2 m/s of sink; the first report has no earlier height, and none."""
     rows = with_gps(motion(2.0), [12.0, 0.0, 0.0])
     rows["gps_p_e_m"][:, 2] = -80.0 + 2.0 * rows["t_s"]
-    estimator = MatrixPilot(MatrixPilotParams(gps_vertical_velocity=False, late_by_one_report=False))
+    estimator = MatrixPilot(MatrixPilotParams(climb_from_height=True, late_by_one_report=False))
     estimator.replay(rows[:GPS_TICKS])
     assert estimator.snapshot()["v_e_m_s"][0, 2] == 0.0
     estimator.replay(rows[GPS_TICKS : 2 * GPS_TICKS])
     np.testing.assert_allclose(estimator.snapshot()["v_e_m_s"][0], [12.0, 0.0, 2.0], rtol=0, atol=1e-9)
 
 
-def test_receiver_without_vertical_velocity_needs_heights_and_one_with_it_does_not():
+def test_climb_from_height_refuses_a_fix_without_one():
     """A height of NaN makes a fix none where the sink rate comes from it; else it is not looked at."""
     rows = with_gps(motion(2.0), [12.0, 0.0, 0.0])
     rows["gps_p_e_m"][:, 2] = np.nan
     counted = {}
-    for reported in (True, False):
-        estimator = MatrixPilot(MatrixPilotParams(gps_vertical_velocity=reported))
+    for from_height in (True, False):
+        estimator = MatrixPilot(MatrixPilotParams(climb_from_height=from_height))
         estimator.replay(rows)
-        counted[reported] = estimator.refused
-    assert counted == {True: {}, False: {"gps": 8}}
+        counted[from_height] = estimator.refused
+    assert counted == {True: {"gps": 8}, False: {}}
 
 
 def test_yaw_error_decays_as_the_linear_loop():

@@ -68,14 +68,35 @@ def tilt_deg(estimates, R):
 def test_clipped_axis_of_a_pull_up_does_not_steer_the_pitch(load):
     """Clipped at 2 g, the reference of gravity is that much too short downwards, and level is not where it was."""
     rows, R = pulled_up(50, load, limit=2.0 * G_M_S2)
-    options = {"known": {"clip_m_s2": 1.99 * G_M_S2}, "found": {"find_clip": True}, "ignored": {}}
+    options = {
+        "known": {"force_full_scale_m_s2": 2.0 * G_M_S2},
+        "set": {"clip_m_s2": 1.98 * G_M_S2},
+        "found": {"find_clip": True},
+        "ignored": {},
+    }
     tilt = {
         name: tilt_deg(power_up(np.eye(3), launch_gate=math.inf, w_rp=1.0, **params).replay(rows), R).max()
         for name, params in options.items()
     }
     assert tilt["known"] < 0.5
+    assert tilt["set"] == pytest.approx(tilt["known"], rel=0, abs=1e-12)
     assert tilt["found"] < 1.5  # the first clipped reading still steers: 20 ms at W_RP = 1 / s and 0.9 of error
     assert tilt["ignored"] > 5.0
+
+
+@pytest.mark.parametrize(
+    ("params", "limit_m_s2"),
+    [
+        ({}, math.inf),
+        ({"force_full_scale_m_s2": 30.0}, 29.7),
+        ({"force_full_scale_m_s2": 30.0, "clip_m_s2": 25.0}, 25.0),
+        ({"clip_m_s2": 25.0}, 25.0),
+    ],
+)
+def test_clip_level_follows_from_the_full_scale_unless_it_is_set(params, limit_m_s2):
+    """Known of the part, 1 % below its end; set by hand, as set; neither, never."""
+    estimator = power_up(np.eye(3), **params)
+    assert estimator.snapshot()["clip_m_s2"][0] == pytest.approx(limit_m_s2, rel=0, abs=1e-12)
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -216,6 +237,8 @@ def test_w_y_until_lock_finds_the_heading_sooner_and_is_gone_after():
     ("params", "message"),
     [
         ({"clip_m_s2": 9.8}, "clip_m_s2 is 9.8 m/s"),
+        ({"force_full_scale_m_s2": 9.8}, "force_full_scale_m_s2 is 9.8 m/s.2; gravity is felt"),
+        ({"force_full_scale_m_s2": math.nan}, "force_full_scale_m_s2 is nan"),
         ({"clip_m_s2": math.nan}, "clip_m_s2 is nan"),
         ({"w_y_until_lock": -1.0}, "w_y_until_lock is -1.0"),
         ({"learn_wind": True, "rotate_history": False}, "learn_wind is on and rotate_history off"),
