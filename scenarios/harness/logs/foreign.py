@@ -5,6 +5,7 @@ from pathlib import Path
 
 from scenarios.harness.logs.recorded import LogError
 
+ENOUGH = 64  # bytes to tell a kind by
 ULOG = b"ULog\x01\x12\x35"
 DATAFLASH = b"\xa3\x95"
 _ULOG, _DATAFLASH = "a ULog file of PX4: name it .ulg", "an ArduPilot DataFlash log: name it .bin"

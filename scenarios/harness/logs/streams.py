@@ -164,9 +164,7 @@ def _wild(t_s: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(t_s - median_filter(t_s, 5, mode="reflect")) > far)
 
 
-def _inertial(
-    path: Path, messages: Messages, books: _Books
-) -> tuple[NDArray[Any], checks.Source, NDArray[np.bool_]]:
+def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[Any], checks.Source, NDArray[np.bool_]]:
     """Rows with the inertial samples alone, how the log names a place in it, and rows before which samples miss."""
     stream = messages.inertial
     good = books.open("imu", stream)
