@@ -6,13 +6,14 @@ the origin says so.  SIM_ parameters, which configure a simulator, are not read.
 
 | parameter | what it means here |
 |-|-|
-| COMPASS_AUTODEC (1 by default), COMPASS_DEC | declination from the world magnetic model at the first fix, else as set |
+| COMPASS_AUTODEC (1 by default), COMPASS_DEC | declination by the world magnetic model at the first fix, else set |
 | COMPASS_USE, _USE2, _USE3, COMPASS_ENABLE | whether a compass is used at all, and which |
 | GPS1_DELAY_MS, GPS_DELAY_MS (first), GPS2_DELAY_MS, GPS_DELAY_MS2 | latency; 0 is the driver's default, unknown here |
 | ARSPD_USE, ARSPD2_USE | 0 is not used, 2 is used at zero throttle only |
 | LOG_BITMASK | which bit to set for the inertial unit |
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -23,6 +24,7 @@ from scenarios.harness.logs.dataflash_records import DataFlash, Records
 from sim.magnetic_field import FIRST_YEAR, declination_rad
 
 FLYING_M_S = 5.0
+LONGEST_DELAY_MS = 2000.0
 FIX_3D = 3
 _WEEK_YEARS = 7.0 / 365.2425
 _EPOCH = 1980.0 + 5.0 / 366.0  # 6 January 1980, when GPS time began
@@ -72,18 +74,18 @@ class Parameters:
         return ""
 
     def airspeed_off(self, instance: int) -> str:
-        """Why an airspeed sensor is not used, in the words of its parameter; empty where it is."""
-        names = ("ARSPD_USE", "ARSPD1_USE") if instance == 0 else (f"ARSPD{instance + 1}_USE",)
-        found = self.first(*names)
+        """Why an airspeed sensor is not used, or not always, in the words of its parameter; empty where it is."""
+        found = self.first("ARSPD_USE" if instance == 0 else f"ARSPD{instance + 1}_USE")
         if found is None or found[1] not in (0.0, 2.0):
             return ""
-        return f"{found[0]} is {found[1]:g}" + (": used at zero throttle only" if found[1] == 2.0 else "")
+        return f"{found[0]} is 0" if found[1] == 0.0 else f"{found[0]} is 2: used at zero throttle only"
 
     def latency(self, instance: int) -> Known | None:
         """The latency of a receiver, where it is set."""
         i = instance + 1
         found = self.first(f"GPS{i}_DELAY_MS", "GPS_DELAY_MS" if i == 1 else f"GPS_DELAY_MS{i}")
-        return Known(1e-3 * found[1], "log", found[0]) if found is not None and found[1] > 0.0 else None
+        believed = found is not None and 0.0 < found[1] <= LONGEST_DELAY_MS
+        return Known(1e-3 * found[1], "log", found[0]) if found is not None and believed else None
 
     def declination(self, place: tuple[float, float, float] | None, year: float) -> Known | None:
         """The declination as the firmware finds it.
@@ -91,6 +93,8 @@ class Parameters:
         place : of the first fix: latitude and longitude, degrees, and altitude, or None      year : NaN if unknown
         """
         automatic, set_rad = self.first("COMPASS_AUTODEC"), self.first("COMPASS_DEC")
+        if set_rad is not None and not abs(set_rad[1]) <= math.pi:  # damaged
+            set_rad = None
         if automatic is not None and automatic[1] == 0.0:
             if set_rad is None:
                 return Known(0.0, "log", "COMPASS_AUTODEC is 0, COMPASS_DEC is not logged: 0 by default")
@@ -98,7 +102,7 @@ class Parameters:
         if place is None:  # the firmware goes on with what it found before
             return None if set_rad is None else Known(set_rad[1], "log", "COMPASS_DEC, without a fix")
         why = "COMPASS_AUTODEC is 1" + (" by default" if automatic is None else "")
-        return Known(*world_model(place, year, why))
+        return world_model(place, year, why)
 
     def log_imu(self) -> str:
         """How to have the inertial unit logged."""
@@ -109,20 +113,20 @@ class Parameters:
         return f"set {listed} of LOG_BITMASK{add}"
 
 
-def world_model(place: tuple[float, float, float], year: float, why: str) -> tuple[float, str, str]:
-    """Declination by the world magnetic model, as value, source and origin; `year` is NaN where the log has no date."""
+def world_model(place: tuple[float, float, float], year: float, why: str) -> Known:
+    """Declination by the world magnetic model; `year` is NaN where the log has no date, `why` what demands it."""
     dated = f"{year:.1f}" if np.isfinite(year) else f"{FIRST_YEAR:.0f} assumed, as the log has no date"
     value = declination_rad(*place, year if np.isfinite(year) else FIRST_YEAR)
-    return value, "log", f"world magnetic model at the first fix, {dated}; {why}"
+    return Known(value, "log", f"world magnetic model at the first fix, {dated}; {why}")
 
 
 def year_of(fixes: Records) -> float:
-    """Decimal year of the first of these GPS messages that has a date, NaN where none does."""
+    """Decimal year of these GPS messages, by the week of GPS time; NaN where none has a date."""
     week = next((name for name in ("GWk", "Week") if name in fixes.columns), None)
     if week is None:
         return float("nan")
-    dated = np.flatnonzero(fixes.fields[week] > 0)
-    return _EPOCH + _WEEK_YEARS * float(fixes.fields[week][dated[0]]) if len(dated) else float("nan")
+    weeks = fixes.fields[week][fixes.fields[week] > 0]
+    return _EPOCH + _WEEK_YEARS * float(np.median(weeks)) if len(weeks) else float("nan")
 
 
 def _first_flight(log: DataFlash) -> int:

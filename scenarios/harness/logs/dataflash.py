@@ -71,10 +71,14 @@ class _Log:
         self.others = list[str]()
         self.clock = Clock(np.zeros(0), np.zeros(0, np.intp))
 
-    def chosen(self, name: str, *wanted: str) -> Records | None:
-        """The instance of a message that is read: the lowest that has the columns `wanted`."""
-        found = [r for r in self.of.instances(name) if set(wanted) <= set(r.columns)]
-        return self._one(found, found[0]) if found else None
+    def readable(self, name: str, *wanted: str) -> list[Records]:
+        """The instances of a message that have the columns `wanted`."""
+        there = self.of.instances(name)
+        found = [r for r in there if set(wanted) <= set(r.columns)]
+        if there and not found:
+            lacking = ", ".join(c for c in wanted if c not in there[0].columns)
+            self.repairs.append(f"{name} has no {lacking}: {sum(len(r.fields) for r in there)} messages not read")
+        return found
 
     def _one(self, instances: list[Records], chosen: Records) -> Records:
         """Note that the others are not read."""
@@ -98,8 +102,11 @@ class _Log:
 
         healthy : columns that are zero where the sensor says that the sample is not to be trusted
         """
-        records = self.chosen(name, *columns)
-        return None if records is None else _trusted(self.made(records, columns), records, healthy)
+        found = self.readable(name, *columns)
+        if not found:
+            return None
+        records = self._one(found, found[0])
+        return _trusted(self.made(records, columns), records, healthy)
 
     def inertial(self, imu: int | None) -> Stream:
         """Gyro and accelerometer: of IMU, else of GYR with ACC at its times."""
@@ -138,38 +145,37 @@ class _Log:
 
         Of several receivers the one that the firmware used most.
         """
-        found = [r for r in self.of.instances("GPS") if {"Status", *FIX} <= set(r.columns)]
+        found = self.readable("GPS", "Status", *FIX)
         if not found:
             return None, {}
         records = self._one(found, max(found, key=lambda r: (_in_use(r), -r.instance)))
-        vertical = ("VZ",) if "VZ" in records.columns else ()
-        stream = self.made(records, FIX + vertical)
+        reports = self._reports_vertical(records)
+        vertical = reports is None or reports.value
+        stream = self.made(records, (*FIX, "VZ") if vertical else FIX)
         speed, course = stream.values[:, 3], np.radians(stream.values[:, 4])
         down = stream.values[:, 5] if vertical else np.zeros(len(speed))
         unknown = np.full(len(speed), np.nan)  # when it was true
         table = (*stream.values[:, :3].T, speed * np.cos(course), speed * np.sin(course), down, unknown)
         no_fix = records.fields["Status"] < FIX_3D
         stream = Stream(stream.name, stream.t_s, np.column_stack(table), stream.why, 1, no_fix).without(no_fix, NO_FIX)
-        known = {"gps_latency_s": self.parameters.latency(records.instance)}
-        if not vertical:
-            known["gps_vertical_velocity"] = Known(False, "log", f"{records.name} has no VZ")
-        else:
-            known["gps_vertical_velocity"] = self._accuracy_says(records.instance)
+        known = {"gps_latency_s": self.parameters.latency(records.instance), "gps_vertical_velocity": reports}
         usable = np.flatnonzero((stream.why == "") & np.isfinite(stream.values[:, :3]).all(axis=1))
         place = _place(stream.values[usable[0]]) if len(usable) else None
         known["declination_rad"] = self.parameters.declination(place, year_of(records.where(~no_fix)))
         return stream, {name: value for name, value in known.items() if value is not None}
 
-    def _accuracy_says(self, instance: int) -> Known | None:
-        """Whether the receiver reports a vertical velocity, by GPA.VV."""
-        found = [r for r in self.of.instances("GPA") if r.instance == instance and "VV" in r.columns]
-        if not found:
-            return None
-        return Known(bool(np.mean(found[0].fields["VV"] != 0) > 0.5), "log", f"{found[0].name}.VV")
+    def _reports_vertical(self, fixes: Records) -> Known | None:
+        """Whether the receiver reports a vertical velocity, as far as the log says so: by VZ, or by GPA.VV."""
+        if "VZ" not in fixes.columns:
+            return Known(False, "log", f"{fixes.name} has no VZ")
+        if np.isnan(self.of.column(fixes, "VZ")).all():
+            return Known(False, "log", f"{fixes.name}.VZ")
+        found = [r for r in self.of.instances("GPA") if r.instance == fixes.instance and "VV" in r.columns]
+        return Known(bool(np.mean(found[0].fields["VV"] != 0) > 0.5), "log", f"{found[0].name}.VV") if found else None
 
     def field(self) -> tuple[Stream | None, dict[str, Known]]:
         """The magnetic field of the first compass that is used, left out where none is."""
-        found = [r for r in self.of.instances("MAG") if set(FIELD) <= set(r.columns)]
+        found = self.readable("MAG", *FIELD)
         if not found:
             return None, {}
         records = self._one(found, next((r for r in found if not self.parameters.compass_off(r.instance)), found[0]))
@@ -183,30 +189,29 @@ class _Log:
 
     def airspeed(self) -> tuple[Stream | None, dict[str, Known]]:
         """The airspeed of the sensor that is used, left out where or while none is."""
-        found = [r for r in self.of.instances("ARSP") if "Airspeed" in r.columns]
+        found = self.readable("ARSP", "Airspeed")
         if not found:
             return None, {}
-        used = [r for r in found if not self.parameters.airspeed_off(r.instance)] or found
-        records = self._one(found, max(used, key=lambda r: (_in_use(r), -r.instance)))
+        on = [r for r in found if not self.parameters.airspeed_off(r.instance)] or found
+        records = self._one(found, max(on, key=lambda r: (_in_use(r), -r.instance)))
         off = self.parameters.airspeed_off(records.instance)
         stream = self.made(records, ("Airspeed",))
-        if off:
+        used = records.fields["U"] != 0 if "U" in records.columns else np.full(len(stream.t_s), not off)
+        if off.endswith("is 0"):
             return stream.without(np.ones(len(stream.t_s), np.bool_), off), {
                 "use_airspeed": Known(False, "log", off.partition(" ")[0])
             }
-        stream = _trusted(stream, records, HEALTHY[2])
-        if "U" in records.columns:
-            stream = stream.without(records.fields["U"] == 0, f"not in use by {records.name}.U")
-        return stream, {}
+        return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"not in use by {records.name}.U"), {}
 
     def attitude(self) -> tuple[Stream | None, Kind]:
         """The attitude: the simulator's where there is one, else what was flown on, else that of the other filter."""
         for name, kind in ATTITUDES:
             for columns, ours in ((("Q1", "Q2", "Q3", "Q4"), ("qw", "qx", "qy", "qz")),
                                   (("Roll", "Pitch", "Yaw"), ("roll", "pitch", "yaw"))):  # fmt: skip
-                records = self.chosen(name, *columns)
-                if records is None:
+                found = [r for r in self.of.instances(name) if set(columns) <= set(r.columns)]
+                if not found:
                     continue
+                records = self._one(found, found[0])
                 stream = self.made(records, columns)
                 values = stream.values if ours[0] == "qw" else np.radians(stream.values)
                 R_eb = tabular.attitude(dict(zip(ours, values.T, strict=True)))

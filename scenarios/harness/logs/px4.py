@@ -1,6 +1,7 @@
 """What the parameters in a log of PX4 say of the instruments aboard.
 
-Initial parameters are those at the beginning of the log; a change counts where it was made before the first row.
+Initial parameters are those at the beginning of the log; a change counts where it was made before the aeroplane first
+flew, in a log without flight every one.
 
 | parameter | what it means here |
 |-|-|
@@ -26,14 +27,10 @@ LOG_FASTER = "set bit 1 (estimator replay) of SDLOG_PROFILE"
 
 
 def parameters(
-    initial: Mapping[str, float], changes: Iterable[tuple[int, str, float]], start_us: float
+    initial: Mapping[str, float], changes: Iterable[tuple[int, str, float]], flight_us: float
 ) -> dict[str, float]:
-    """The parameters at the time `start_us`; `changes` are time, name and value."""
-    values = dict(initial)
-    for at_us, name, value in changes:
-        if at_us <= start_us:
-            values[name] = value
-    return values
+    """The parameters at the time `flight_us`; `changes` are time, name and value."""
+    return {**initial, **{name: value for at_us, name, value in changes if at_us <= flight_us}}
 
 
 def off(values: Mapping[str, float], what: str) -> str:
@@ -56,7 +53,7 @@ def declination(values: Mapping[str, float], place: tuple[float, float, float] |
     """
     kind, set_deg = values.get("EKF2_DECL_TYPE"), values.get("EKF2_MAG_DECL")
     if kind is not None and int(kind) & _FROM_MODEL and place is not None:
-        return Known(*world_model(place, year, f"EKF2_DECL_TYPE is {int(kind)}"))
+        return world_model(place, year, f"EKF2_DECL_TYPE is {int(kind)}")
     if set_deg is None:
         return None
     return Known(math.radians(float(set_deg)), "log", "EKF2_MAG_DECL")

@@ -4,8 +4,8 @@ PX4's axes are ours: forward, right, down against north, east, down; its quatern
 Where the simulator's attitude was logged (vehicle_attitude_groundtruth) it is the truth, else vehicle_attitude is
 what was flown on.  Until 2017 the magnetometer and the barometer were in sensor_combined.
 
-A fix was true at its ``timestamp_sample``, unless that is 0 or no earlier than the fix can have arrived: drivers that do
-not know it fill in the time of arrival.
+A fix was true at its ``timestamp_sample``, unless that is 0 or less than 10 ms before its arrival: drivers that do not
+know it fill in the time of arrival.
 """
 
 import contextlib
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from estimator.instruments import Known
 from estimator.interface import Array
 from scenarios.harness.logs import foreign, px4, streams, tabular
+from scenarios.harness.logs.ardupilot import FLYING_M_S
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from scenarios.harness.logs.streams import NO_FIX, Kind, Stream
 from scenarios.harness.logs.ulog_bytes import whole
@@ -52,7 +53,6 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     repairs: list[str] = []
     log = _Log(path, repairs)
     inertial, dt_s, names = _inertial(log, imu)
-    log.start(inertial.t_s)
     fixes, receiver = _fixes(log)
     field, compass = _switched(log, "magnetometer", _field(log))
     airspeed, pitot = _switched(log, "airspeed", _airspeed(log))
@@ -92,17 +92,23 @@ class _Log:
         for topic in self._log.data_list:
             self.topics.setdefault((topic.name, topic.multi_id), topic.data)
         self.others = list[str]()
-        self.parameters: Mapping[str, float] = self._log.initial_parameters
+        changes = self._log.changed_parameters
+        self.parameters = px4.parameters(self._log.initial_parameters, changes, self._first_flight_us())
         if self._log.file_corruption:
             repairs.append("messages that contradict their topic left out")
         if self._log.dropouts:
             lost_s = sum(dropout.duration for dropout in self._log.dropouts) / 1000.0
             repairs.append(f"{len(self._log.dropouts)} times the logger could not follow, for {lost_s:.2f} s in all")
 
-    def start(self, t_s: Array) -> None:
-        """Set the parameters to those at the first inertial sample."""
-        first_us = 1e6 * float(np.nanmin(t_s)) if np.isfinite(t_s).any() else 0.0
-        self.parameters = px4.parameters(self._log.initial_parameters, self._log.changed_parameters, first_us)
+    def _first_flight_us(self) -> float:
+        """When the aeroplane first flew by GPS; infinite where it did not."""
+        for name in ("vehicle_gps_position", "sensor_gps"):
+            topic = self.topics.get((name, 0), {})
+            if {"vel_n_m_s", "vel_e_m_s", "fix_type"} <= set(topic):
+                fast = np.hypot(topic["vel_n_m_s"], topic["vel_e_m_s"]) > FLYING_M_S
+                flying = fast & (topic["fix_type"] >= FIX_3D)
+                return float(topic["timestamp"][np.argmax(flying)]) if flying.any() else np.inf
+        return np.inf
 
     def first(self, *names: str) -> tuple[str, Topic] | None:
         """The lowest instance of the first of these topics that is there."""
@@ -194,31 +200,40 @@ def _fixes(log: _Log) -> tuple[Stream | None, dict[str, Known]]:
     else:
         place = log.columns(name, topic, "lat", "lon", "alt") / (1e7, 1e7, 1e3)
     velocity = log.columns(name, topic, "vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
-    t_s = _published_s(topic)
-    true_s = (
-        log.columns(name, topic, "timestamp_sample")[:, 0] / 1e6 if "timestamp_sample" in topic else np.zeros(len(t_s))
-    )
-    late_s = t_s - true_s
-    true_s = np.where((true_s > 0.0) & (late_s >= SOONEST_S) & (late_s <= LATEST_S), true_s, np.nan)
+    if level := bool(np.isnan(velocity[:, 2]).all()):
+        velocity[:, 2] = 0.0
+    t_s, true_s = _published_s(topic), _true_s(topic)
     stream = Stream.of(name, t_s, np.column_stack((place, velocity, true_s)))
     stream = stream.without(topic["fix_type"] < FIX_3D, NO_FIX)
     if "vel_ned_valid" in topic:
         stream = stream.without(topic["vel_ned_valid"] == 0, NO_VELOCITY)
     stream = replace(stream, optional=1, lost=stream.why != "")
     usable = np.flatnonzero((stream.why == "") & (np.abs(place) <= (90.0, 180.0, 1e5)).all(axis=1))
-    where = tuple(float(x) for x in place[usable[0]]) if len(usable) else None
+    latitude, longitude, altitude = place[usable[0]].tolist() if len(usable) else (0.0, 0.0, 0.0)
+    where = (latitude, longitude, altitude) if len(usable) else None
     known = {
+        "gps_vertical_velocity": Known(False, "log", f"{name}.vel_d_m_s") if level else None,
         "gps_latency_s": px4.latency(log.parameters),
         "declination_rad": px4.declination(log.parameters, where, _year(topic)),
     }
     return stream, {name: value for name, value in known.items() if value is not None}
 
 
+def _true_s(topic: Topic) -> Array:
+    """When each fix was true, NaN where its stamp is none; see the module."""
+    sampled_us = topic.get("timestamp_sample")
+    if sampled_us is None:
+        return np.full(len(topic["timestamp"]), np.nan)
+    true_s = sampled_us.astype(np.float64) / 1e6
+    late_s = _published_s(topic) - true_s
+    return np.where((true_s > 0.0) & (late_s >= SOONEST_S) & (late_s <= LATEST_S), true_s, np.nan)
+
+
 def _year(topic: Topic) -> float:
-    """Decimal year of the first fix that has a date, NaN where none does."""
+    """Decimal year of the fixes, NaN where none has a date."""
     utc_us = topic.get("time_utc_usec", np.zeros(0))
     dated = utc_us[utc_us > 0]
-    return 1970.0 + float(dated[0]) / (365.2425 * 86400e6) if len(dated) else float("nan")
+    return 1970.0 + float(np.median(dated)) / (365.2425 * 86400e6) if len(dated) else float("nan")
 
 
 def _switched(log: _Log, what: str, stream: Stream | None) -> tuple[Stream | None, dict[str, Known]]:
