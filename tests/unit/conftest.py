@@ -38,8 +38,8 @@ class LoggedFlight:
     airspeed: NDArray[Any]
     height: NDArray[Any]
 
-    def expected(self) -> NDArray[Any]:
-        """The rows that a reader should make of it, filled by walking along it."""
+    def expected(self, *, stamped: bool = True) -> NDArray[Any]:
+        """The rows that a reader should make of it, filled by walking along it; `stamped`: with times of the fixes."""
         rows = np.zeros(len(self.t_us), MEASURED_DTYPE)
         rows["t_s"], rows["dt_s"] = self.t_us / 1e6, 0.02
         rows["gyro_b_rad_s"], rows["force_b_m_s2"] = self.rate, self.force
@@ -48,7 +48,7 @@ class LoggedFlight:
             for i in np.flatnonzero((self.fix_us > t_us - 20_000) & (self.fix_us <= t_us)):
                 n, e, _ = self.v_e[i]
                 rows["gps_new"][k], rows["gps_valid"][k:] = 1, 1
-                rows["gps_t_s"][k:] = self.fix_us[i] / 1e6
+                rows["gps_t_s"][k:] = self.fix_us[i] / 1e6 if stamped else np.nan
                 rows["gps_p_e_m"][k:], rows["gps_v_e_m_s"][k:] = self.p_e[i] - self.p_e[0], self.v_e[i]
                 rows["gps_course_rad"][k:], rows["gps_speed_m_s"][k:] = np.arctan2(e, n) % (2 * np.pi), np.hypot(n, e)
             for i in np.flatnonzero((self.field_us > t_us - 20_000) & (self.field_us <= t_us)):

@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-from scenarios.harness.logs import checks, column_map
+from scenarios.harness.logs import checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
@@ -32,7 +32,7 @@ def read(
     reference : attitudes to score against, in a file of their own; for reference vectors one of the same set, for
                 others a text file with times on the same clock
     columns : column map of a text or MATLAB file, see `column_map`
-    imu : which inertial unit of an autopilot's log, from 0; unless told the one that the reader takes for the first
+    imu : which inertial unit of an autopilot's log, from 0; by default the first one
 
     Raises
     ------
@@ -66,7 +66,8 @@ def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) ->
         return import_module(f"{__name__}.{autopilot}").read(path, imu)
     if path.is_dir() or name.endswith(".parquet"):
         return checks.mended(import_module(f"{__name__}.ours").read(path), path)
-    raise LogError(f"{path}: unknown kind of log; {KINDS}")
+    found = foreign.hint(path.read_bytes()[: foreign.ENOUGH])
+    raise LogError(f"{path}: this is {found}" if found else f"{path}: unknown kind of log; {KINDS}")
 
 
 def _module(name: str, endings: dict[str, str]) -> str:
