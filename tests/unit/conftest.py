@@ -21,7 +21,7 @@ PLACE = 47.4, 8.5, 488.0
 FIELD_E_UT = np.array([21.5, 1.2, 43.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LoggedFlight:
     """Inertial samples at 50 Hz, and what else was measured, at times (microseconds) between their ticks,
     and those of the air on ticks.
