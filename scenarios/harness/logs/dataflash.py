@@ -147,7 +147,8 @@ class _Log:
         """
         found = self.readable("GPS", "Status", *FIX)
         if not found:
-            return None, {}
+            set_before = self.parameters.declination(None, np.nan)
+            return None, {"declination_rad": set_before} if set_before else {}
         records = self._one(found, max(found, key=lambda r: (_in_use(r), -r.instance)))
         reports = self._reports_vertical(records)
         vertical = reports is None or reports.value

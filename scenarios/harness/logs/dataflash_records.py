@@ -134,11 +134,14 @@ class DataFlash:
 
     def _logged_units(self) -> dict[tuple[str, str], float]:
         """Factor to ours of each (message, column) whose logged unit we know."""
-        if not {"UNIT", "MULT", "FMTU"} <= self._types.keys():
+        needed = {"UNIT": ("Id", "Label"), "MULT": ("Id", "Mult"), "FMTU": ("FmtType", "UnitIds", "MultIds")}
+        found = {name: self.records(name) for name in needed}
+        if not all(set(columns) <= set(found[name].columns) for name, columns in needed.items()):
             return {}
-        unit, mult, formats = (self.records(name).fields for name in ("UNIT", "MULT", "FMTU"))
-        labels = {chr(i): label.decode("ascii", "replace") for i, label in zip(unit["Id"], unit["Label"], strict=True)}
-        multipliers = {chr(i): float(m) for i, m in zip(mult["Id"], mult["Mult"], strict=True)}
+        unit, mult, formats = (found[name].fields for name in needed)
+        letters = [chr(int(i) & 0xFF) for i in unit["Id"]]
+        labels = {i: label.decode("ascii", "replace") for i, label in zip(letters, unit["Label"], strict=True)}
+        multipliers = {chr(int(i) & 0xFF): float(m) for i, m in zip(mult["Id"], mult["Mult"], strict=True)}
         factors = {}
         for kind, units, by in zip(formats["FmtType"], formats["UnitIds"], formats["MultIds"], strict=True):
             if int(kind) not in self._formats:
