@@ -59,7 +59,7 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     height = _height(log)
     attitude = _attitude(log)
     if log.others:
-        repairs.append(f"of several instances one is read: {'; '.join(log.others)}")
+        repairs.append(f"only one of several instances is read: {'; '.join(log.others)}")
     messages = streams.Messages(
         inertial, dt_s, names, fixes, field, airspeed, height, *attitude,
         {**receiver, **compass, **pitot}, px4.LOG_FASTER,
@@ -124,7 +124,7 @@ class _Log:
     def one(self, name: str, chosen: int) -> int:
         """Note that the other instances of the topic are not read."""
         if len(there := self.instances(name)) > 1:
-            self.others.append(f"{name} {chosen} of {', '.join(map(str, there))}")
+            self.others.append(f"{name} {chosen} (of {', '.join(map(str, there))})")
         return chosen
 
     def columns(self, name: str, topic: Topic, *fields: str) -> Array:
