@@ -1,9 +1,9 @@
-"""What may be wrong in a log, whatever its format: mended and counted, or refused with the row and the column.
+"""What may be wrong in a log, whatever its format: mended and counted, or rejected with the row and the column.
 
 Mended: rows without a number in time, gyro or accelerometer, and rows of zeros before the first reading, are left
 out, GPS fixes, magnetic and air samples without a number too; rows late by up to a second are sorted,
 repeated times left out; times in milli-, micro- or nanoseconds, rates in degrees and forces in g are converted.
-Told: gaps.  Refused: a column without a number, a clock that runs back, more rows bad than good, an accelerometer
+Reported: gaps.  Rejected: a column without a number, a clock that runs back, more rows bad than good, an accelerometer
 with the opposite sign, whatever is no inertial unit's at all.
 
 Units are judged by what cannot be otherwise.  See `rate_factor` for the gyro.

@@ -45,7 +45,7 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     height = log.stream("BARO", ("Alt",), HEALTHY[2])
     attitude = log.attitude()
     if log.others:
-        log.repairs.append(f"of several instances one is read: {'; '.join(log.others)}")
+        log.repairs.append(f"only one of several instances is read: {'; '.join(log.others)}")
     messages = streams.Messages(
         inertial,
         np.full(len(inertial.t_s), np.nan),
@@ -84,7 +84,7 @@ class _Log:
         """Note that the others are not read."""
         if len(instances) > 1:
             listed = ", ".join(str(r.instance) for r in instances)
-            self.others.append(f"{instances[0].name} {chosen.instance} of {listed}")
+            self.others.append(f"{instances[0].name} {chosen.instance} (of {listed})")
         return chosen
 
     def made(self, records: Records, columns: tuple[str, ...]) -> Stream:
@@ -94,7 +94,7 @@ class _Log:
         if t_s is not None and self.clock.agrees(records, t_s):
             return _at_times(stream, t_s)
         t_s, in_gap = self.clock.by_order(records)
-        self.repairs.append(f"{records.name}: no time by the clock of the log; placed by the order of the records")
+        self.repairs.append(f"{records.name}: not on the clock of the log; placed by the order of the records")
         return _at_times(stream, t_s).without(np.isnan(t_s), streams.OUTSIDE).without(in_gap, IN_GAP)
 
     def stream(self, name: str, columns: tuple[str, ...], healthy: tuple[str, ...] = ()) -> Stream | None:
@@ -202,7 +202,7 @@ class _Log:
             return stream.without(np.ones(len(stream.t_s), np.bool_), off), {
                 "use_airspeed": Known(False, "log", off.partition(" ")[0])
             }
-        return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"not in use by {records.name}.U"), {}
+        return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"{records.name}.U is 0: not in use"), {}
 
     def attitude(self) -> tuple[Stream | None, Kind]:
         """The attitude: the simulator's where there is one, else what was flown on, else that of the other filter."""

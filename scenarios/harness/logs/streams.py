@@ -27,6 +27,7 @@ Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
 SLOWEST_S = 0.1  # an inertial unit logged more slowly is not to be integrated
 LOST_S, LOST_REPORTS = 2.0, 3.0  # a fix no longer holds after this silence, or so many usual intervals, if longer
 CLIMB_M = 5.0  # a receiver whose height changed by more than this, at no vertical velocity, does not report one
+FEW = 0.01  # a share of the fixes below this is damage
 FAR = "at a time far from its neighbours"
 OUTSIDE, IN_GAP = "outside the inertial record", "in a gap of the inertial record"
 REPLACED = "replaced by a later one in the same row"
@@ -268,10 +269,11 @@ def _put_fixes(ticks: _Ticks, fixes: Stream | None, known: dict[str, Known]) -> 
     if len(at_s) > 2:
         known["gps_rate_hz"] = Known(1.0 / float(np.median(np.diff(at_s))), "log", fixes.name)
     known["gps_stamped"] = Known(bool(np.isfinite(rows["gps_t_s"][new]).mean() > 0.5), "log", fixes.name)
-    if np.any(rows["gps_v_e_m_s"][new, 2] != 0.0):
+    if np.mean(rows["gps_v_e_m_s"][new, 2] != 0.0) > FEW:
         known["gps_vertical_velocity"] = Known(True, "log", fixes.name)
     elif np.ptp(rows["gps_p_e_m"][new, 2]) > CLIMB_M:
         known["gps_vertical_velocity"] = Known(False, "log", fixes.name)
+        rows["gps_v_e_m_s"][:, 2] = 0.0
     return float(origin[0]), float(origin[1])
 
 
