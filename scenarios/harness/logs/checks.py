@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from estimator.interface import Array
 from estimator.screening import G_M_S2, GYRO_RANGE_RAD_S, LONGEST_GAP_S
+from scenarios.harness.logs import accounts
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.witnesses import witnesses
 
@@ -31,17 +32,23 @@ _DEGREES = 180.0 / np.pi
 _ARRIVALS = (
     ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s")),
     ("mag_new", "magnetic samples", ("mag_b_ut",)),
-    ("air_new", "air-data samples", ("airspeed_m_s",)),
+    ("air_new", "air-data samples", ("airspeed_m_s", "baro_height_m")),
 )
+_EITHER = "air_new"  # arrives where one of its numbers is there: not every aeroplane has a pitot tube
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """How a log's own words name a place in it: its file, its names of our quantities, its number of a row."""
+    """How a log's own words name a place in it: its file, its names of our quantities, its number of a row.
+
+    remedy : what to do where the specific force is the wrong way round      offered : names of all columns it has
+    """
 
     path: Path
     columns: Mapping[str, str] = field(default_factory=dict)
     row: Callable[[int], str] = lambda k: f"row {k + 1}"
+    offered: tuple[str, ...] = ()
+    remedy: str = "its axes point up, or it reads gravity minus acceleration"
 
     def column(self, quantity: str) -> str:
         """The file's own name of `quantity`."""
@@ -119,6 +126,8 @@ def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list
 def mended(log: RecordedLog, path: Path) -> RecordedLog:
     """`log` as some reader gave it, with its rows put in order, and judged; see the module.
 
+    What becomes of its rows and of what arrived in them is entered in its ledger, beside what its reader left out.
+
     Raises
     ------
     LogError      one line with the file, the row and the column
@@ -128,16 +137,21 @@ def mended(log: RecordedLog, path: Path) -> RecordedLog:
     vectors = {"gyro": rows["gyro_b_rad_s"], "force": rows["force_b_m_s2"]}
     numbers = {f"{name}.{axis}": v[:, i] for name, v in vectors.items() for i, axis in enumerate("xyz")}
     keep = kept(rows["t_s"], numbers, source, repairs)
+    accounts.inertial(log.ledger, rows["t_s"], np.column_stack(list(numbers.values())), keep)
     if len(keep) < len(rows) or np.any(np.diff(keep) != 1):
         moved = rows[keep]
-        in_order = np.all(np.diff(keep) > 0)
-        for name, _, _ in _ARRIVALS if in_order else ():  # what arrived with a row left out arrives with the next
-            so_far = np.concatenate(([0], np.cumsum(rows[name])))[keep + 1]
-            moved[name] = np.diff(so_far, prepend=0) > 0
+        for name, _, _ in _ARRIVALS:  # what arrived with a row left out arrives with the next
+            at = np.searchsorted(moved["t_s"], rows["t_s"][rows[name] > 0])
+            moved[name] = 0
+            moved[name][at[at < len(moved)]] = 1
         rows = moved
         if reference is not None:
             reference = replace(reference, R_eb=reference.R_eb[keep])
-    return judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
+    found = judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
+    accounts.arrivals(log.ledger, log.rows, rows, found.rows)
+    if log.reference is not None and reference is not None:
+        accounts.reference(log.ledger, log.reference.known, int(reference.known.sum()))
+    return found
 
 
 def judged(log: RecordedLog, source: Source) -> RecordedLog:
@@ -189,7 +203,8 @@ def _check_arrivals(rows: NDArray[Any], repairs: list[str]) -> None:
     """What arrived without a number in it did not arrive."""
     for new, what, columns in _ARRIVALS:
         broken = rows[new] > 0
-        broken &= ~np.all([np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns], axis=0)
+        there = [np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns]
+        broken &= ~(np.any if new == _EITHER else np.all)(there, axis=0)
         if broken.any():
             repairs.append(f"{broken.sum()} {what} without a number left out, first {_at(rows, broken)}")
             rows[new][broken] = 0
@@ -206,13 +221,12 @@ def _check_force(rows: NDArray[Any], source: Source, repairs: list[str]) -> None
         repairs.append(f"{source.column('force')} in g, not m/s^2: converted")
         rows["force_b_m_s2"] *= G_M_S2
     elif not 0.5 * G_M_S2 < length < 2.5 * G_M_S2:
-        raise source.refusal(None, "force", f"{length:g} m/s^2 is its median; an aeroplane feels about {G_M_S2:.1f}")
+        counts = "; counts need a factor in a column map" if length > 100.0 * G_M_S2 else ""
+        why = f"{length:g} m/s^2 is its median; an aeroplane feels about {G_M_S2:.1f}{counts}"
+        raise source.refusal(None, "force", why)
     z = float(np.median(rows["force_b_m_s2"][:, 2]))
     if z > 0.5 * G_M_S2:
-        why = (
-            f"{z:.1f} m/s^2 is the median of z; specific force is {-G_M_S2:.1f} when level: give the force a minus "
-            "sign in the map, or, where the axes are forward, left, up, y and z of gyro and force"
-        )
+        why = f"{z:.1f} m/s^2 is the median of z; specific force is {-G_M_S2:.1f} when level: {source.remedy}"
         raise source.refusal(None, "force", why)
 
 

@@ -1,5 +1,11 @@
-"""MATLAB files (up to version 7.2) by a column map: vectors of one length, in a structure or at the top."""
+"""MATLAB files (up to version 7.2): vectors and matrices, in structures or at the top, by a map or by their names.
 
+A column of a matrix is named ``name[0]``, or ``name.Label`` where an array ``name_label`` beside it holds the labels.
+Files with the messages of an ArduPilot log are read as such by `ardupilot_matlab`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,10 +13,18 @@ import numpy as np
 from scipy.io import loadmat  # type: ignore[import-untyped]
 
 from estimator.interface import Array
-from scenarios.harness.logs import tabular
+from scenarios.harness.logs import ardupilot_matlab, tabular
 from scenarios.harness.logs.checks import Source
-from scenarios.harness.logs.column_map import MAPS, ColumnMap, automatic, load
+from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
 from scenarios.harness.logs.recorded import LogError, RecordedLog
+
+LABELS = "_label"  # behind the name of a matrix: the array of its columns' names
+WIDEST = 64  # a matrix with more columns is no table
+_SAVE = "save it again with save('file.mat', '-v7')"
+_OBJECTS = (
+    "save its columns as arrays, for instance with S = table2struct(T, 'ToScalar', true); "
+    "save('file.mat', '-struct', 'S', '-v7')"
+)
 
 
 def read(path: Path, columns: ColumnMap | None = None) -> RecordedLog:
@@ -20,33 +34,151 @@ def read(path: Path, columns: ColumnMap | None = None) -> RecordedLog:
     ------
     LogError      one line with the file, the row and the column
     """
+    content = _content(path)
+    if columns is None and (messages := ardupilot_matlab.messages(_tables(content))):
+        return ardupilot_matlab.read(path, messages, content)
+    if columns is None:
+        columns = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), None)
+    found, columns = _columns(path, content, columns or ColumnMap())
+    log = tabular.recorded(found, columns, Source(path, offered=_offered(found)), matrix_of)
+    return replace(log, repairs=log.repairs)
+
+
+def groups(path: Path) -> tuple[list[tabular.Group], Source, tuple[str, ...]]:
+    """Columns of the file by our names, and the source; LogError as `read`."""
+    content = _content(path)
+    known = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), ColumnMap())
+    found, meanings = _columns(path, content, known)
+    made, source = tabular.take(found, meanings, Source(path, offered=_offered(found)), matrix_of)
+    return made, source, ()
+
+
+def _content(path: Path) -> dict[str, Any]:
+    """The variables of a file; LogError where it cannot be read."""
+    try:
+        head = path.read_bytes()[:520]
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+    if head.startswith(b"MATLAB 7.3") or b"\x89HDF\r\n" in head:
+        raise LogError(f"{path}: a MATLAB file of version 7.3 (HDF5): {_SAVE}")
     try:
         content = {name: v for name, v in loadmat(path, squeeze_me=True).items() if not name.startswith("__")}
     except Exception as error:  # scipy raises whatever its parser meets in a file cut off or foreign
         raise LogError(f"{path}: cannot be read as a MATLAB file: {' '.join(str(error).split())}") from error
-    if columns is None:
-        columns = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), None)
-    table = _columns(path, content, columns.struct if columns else "")
-    return tabular.recorded(table, columns or automatic(table), Source(path))
+    objects = [name for name, v in content.items() if type(v).__name__ in ("MatlabOpaque", "MatlabFunction")]
+    if objects and len(objects) == len(content):
+        raise LogError(f"{path}: {', '.join(objects)}: an object of MATLAB, a table or a time series: {_OBJECTS}")
+    return {name: v for name, v in content.items() if name not in objects}
 
 
-def _fits(content: dict[str, Any], known: ColumnMap) -> bool:
+def _fits(content: Mapping[str, Any], known: ColumnMap) -> bool:
     struct = content.get(known.struct)
     names = getattr(getattr(struct, "dtype", None), "names", None) or ()
-    return set(known.columns) <= set(names)
+    return bool(known.columns) and set(known.columns) <= set(names)
 
 
-def _columns(path: Path, content: dict[str, Any], struct: str) -> dict[str, Array]:
-    """The vectors of the longest common length in the structure of that dotted name, or at the top."""
-    for name in filter(None, struct.split(".")):
+def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Array]]:
+    """Matrices with labels, and structures of vectors: name -> label -> column."""
+    tables: dict[str, dict[str, Array]] = {}
+    for name, value in content.items():
+        labels = _labels(content.get(f"{name}{LABELS}"))
+        if labels and (matrix := _matrix(value, len(labels))) is not None:
+            tables[name] = dict(zip(labels, matrix.T, strict=True))
+        elif _is_struct(value):
+            fields = {field: np.asarray(value[field].item()) for field in value.dtype.names}
+            columns = {f: v.astype(np.float64) for f, v in fields.items() if v.ndim == 1 and v.dtype.kind in "fiub"}
+            if columns:
+                tables[name] = columns
+    return tables
+
+
+def _labels(value: Any) -> list[str]:
+    """Names of columns, of a cell array or a matrix of characters."""
+    if value is None:
+        return []
+    cells = np.atleast_1d(np.asarray(value)).ravel()
+    return [str(np.asarray(cell).item() if np.asarray(cell).size == 1 else cell).strip() for cell in cells]
+
+
+def _matrix(value: Any, columns: int = 0) -> Array | None:
+    """A matrix of numbers with its rows in order of time, shape (n, `columns`); None for anything else."""
+    matrix = np.asarray(value)
+    if matrix.dtype.kind not in "fiub" or matrix.ndim not in (1, 2):
+        return None
+    if matrix.ndim == 1:  # of one row, or of one column
+        matrix = matrix[None, :] if columns == len(matrix) else matrix[:, None]
+    if (columns and matrix.shape[1] != columns) or (not columns and matrix.shape[0] < matrix.shape[1]):
+        matrix = matrix.T
+    if matrix.shape[1] > WIDEST or (columns and matrix.shape[1] != columns):
+        return None
+    return matrix.astype(np.float64)
+
+
+def _is_struct(value: Any) -> bool:
+    return isinstance(value, np.ndarray | np.void) and value.dtype.names is not None and value.size == 1
+
+
+def _columns(path: Path, content: dict[str, Any], how: ColumnMap) -> tuple[dict[str, Array], ColumnMap]:
+    """All columns of numbers by their names, and what they mean."""
+    at = ""
+    for name in filter(None, how.struct.split(".")):
         if name not in content:
-            raise LogError(f"{path}: no structure {struct!r}; it has {', '.join(content) or 'nothing'}")
-        record = np.asarray(content[name])
-        if record.dtype.names is None:
+            raise LogError(f"{path}: no structure {how.struct!r}; it has {', '.join(content) or 'nothing'}")
+        if not _is_struct(content[name]):
             raise LogError(f"{path}: {name!r} is no structure")
-        content = {field: record[field].item() for field in record.dtype.names}
-    vectors = {name: np.asarray(v) for name, v in content.items()}
-    vectors = {name: v for name, v in vectors.items() if v.ndim == 1 and v.dtype.kind in "fiub" and len(v) > 1}
-    if not vectors:
-        raise LogError(f"{path}: no column of numbers; it has {', '.join(content)}: name the structure in a column map")
-    return {name: v.astype(np.float64) for name, v in vectors.items()}
+        content = {field: content[name][field].item() for field in content[name].dtype.names}
+        at = f" of {how.struct}"
+    columns = dict(_flat(content))
+    if not columns:
+        shown = ", ".join(f"{name} ({_shape(v)})" for name, v in content.items()) or "nothing"
+        raise LogError(f"{path}: no column of numbers{at}; it has {shown}")
+    if not how.columns:  # by names: of the structures that hold no vector that long none is meant
+        how = how.of(columns)
+    if not how.columns:
+        raise LogError(
+            f"{path}: no column whose name is understood; it has {', '.join(_offered(columns))}: name them in a column "
+            'map (--columns MAP.toml), a column of a matrix as "name[0]"'
+        )
+    return columns, how
+
+
+def _flat(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Array]]:
+    """Vectors, columns of matrices by index and by label, and the same in structures, by dotted names."""
+    found: list[tuple[str, Array]] = []
+    for name, value in content.items():
+        if _is_struct(value):
+            value = np.atleast_1d(value)[0]
+            inner = {field: value[field] for field in value.dtype.names}
+            inner = {f: v.item() if isinstance(v, np.ndarray) and v.dtype == object and v.size == 1 else v
+                     for f, v in inner.items()}  # fmt: skip
+            found += _flat(inner, f"{prefix}{name}.")
+            continue
+        matrix = _matrix(value) if not isinstance(value, str) else None
+        if matrix is None or len(matrix) < 2:
+            continue
+        if matrix.shape[1] == 1:
+            found.append((f"{prefix}{name}", matrix[:, 0]))
+            continue
+        labels = _labels(content.get(f"{name}{LABELS}"))
+        if labels and (labelled := _matrix(value, len(labels))) is not None:
+            found += [(f"{prefix}{name}.{label}", column) for label, column in zip(labels, labelled.T, strict=True)]
+        found += [(f"{prefix}{name}[{j}]", column) for j, column in enumerate(matrix.T)]
+    return found
+
+
+def _offered(columns: Mapping[str, Array]) -> tuple[str, ...]:
+    """Names of the columns in a few words: those of a matrix without labels as one."""
+    short: dict[str, int] = {}
+    for name in columns:
+        of = matrix_of(name) if name.endswith("]") else name
+        short[of] = short.get(of, 0) + 1
+    labelled = {matrix_of(name) for name in columns if not name.endswith("]")}
+    return tuple(
+        f"{name}[0] to [{n - 1}]" if f"{name}[0]" in columns else name
+        for name, n in short.items()
+        if not (f"{name}[0]" in columns and name in labelled)
+    )
+
+
+def _shape(value: Any) -> str:
+    return " x ".join(str(n) for n in np.shape(value)) or type(value).__name__
