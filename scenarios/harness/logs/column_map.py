@@ -136,7 +136,9 @@ def _meaning(entry: Any, where: str) -> Meaning:
     if isinstance(entry, dict):
         for key in entry:
             if key not in ("is", "unit", "factor", "offset"):
-                raise LogError(f"{where}: unknown entry {key!r}: {near_misses(key, ('is', 'unit', 'factor', 'offset'))}")
+                raise LogError(
+                    f"{where}: unknown entry {key!r}: {near_misses(key, ('is', 'unit', 'factor', 'offset'))}"
+                )
         spelled, unit = entry.get("is"), entry.get("unit", "")
         factor, offset = (_number(entry.get(k, d), k, where) for k, d in (("factor", 1.0), ("offset", 0.0)))
         if factor == 0.0:

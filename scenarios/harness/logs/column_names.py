@@ -151,7 +151,13 @@ def _named(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, int, s
     found = [*_matrix(words, indices), *_quaternion(words, indices)]
     if found:
         return found
-    return [*_vector(words, indices), *_angle(words), *_velocity(words, indices), *_scalar(words, indices), *_time(words)]
+    return [
+        *_vector(words, indices),
+        *_angle(words),
+        *_velocity(words, indices),
+        *_scalar(words, indices),
+        *_time(words),
+    ]
 
 
 def _unglued(word: str, *, alone: bool) -> list[str]:
@@ -234,7 +240,9 @@ def _angle(words: list[str]) -> Iterable[tuple[str, int, str, float]]:
     rest = present - {named[0]} - _NEUTRAL - _TRUTH
     if len(rest) <= 1 and not any(w.isdigit() for w in rest):
         best = present & {"ref", "reference", "truth", "groundtruth"}
-        stem = _stem([w for w in words if w != named[0]], ()) + (" greek" if named[0] in ("phi", "theta", "psi") else "")
+        stem = _stem([w for w in words if w != named[0]], ()) + (
+            " greek" if named[0] in ("phi", "theta", "psi") else ""
+        )
         rank = (0 if best else 1) + 2 * len(rest) + (named[0] in ("heading", "hdg"))
         yield _ANGLES[named[0]], rank, stem, 1.0
 

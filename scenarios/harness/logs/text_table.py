@@ -25,7 +25,9 @@ from scenarios.harness.logs.recorded import LogError
 
 DELIMITERS = (";", "\t", ",", "|")
 REMARKS = ("#", "%", "//")
-NOTHING = frozenset(("", "nan", "null", "-", "--", "na", "n/a", "none", "#n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan"))
+NOTHING = frozenset(
+    ("", "nan", "null", "-", "--", "na", "n/a", "none", "#n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan")
+)
 _SAMPLE = 50  # lines that are looked at
 _DAY_S = 86400.0
 _CLOCK = re.compile(r"(\d{1,2}):([0-5]\d)(?::([0-5]?\d(?:[.,]\d*)?))?")
@@ -139,7 +141,11 @@ def _cells(path: Path, lines: Sequence[str], delimiter: str) -> list[list[str]]:
 
 
 def _header(
-    path: Path, how: ColumnMap, lines: Sequence[str], places: tuple[list[int], list[int]], cells: list[list[str]],
+    path: Path,
+    how: ColumnMap,
+    lines: Sequence[str],
+    places: tuple[list[int], list[int]],
+    cells: list[list[str]],
     delimiter: str,
 ) -> tuple[list[str], list[int], list[list[str]]]:
     """Names of the columns, and what remains below them: of the map, the first line, or a remark above the numbers."""
