@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.instruments import Known
 from estimator.interface import Array
@@ -75,7 +76,7 @@ def _vector(name: str, meaning: str, values: Array, axes: str) -> list[Column]:
     return [Column(name.format(a), meaning.format(a), values[:, i]) for i, a in enumerate(axes)]
 
 
-def _where(new: Array, values: Array) -> Array:
+def _where(new: NDArray[np.bool_], values: Array) -> Array:
     return np.where(new if values.ndim == 1 else new[:, None], values, np.nan)
 
 
@@ -89,6 +90,7 @@ def to_csv(found: list[Column]) -> str:
 
 
 def _cells(values: Array) -> Iterator[str]:
+    """Numbers in the fewest digits that bring them back bit for bit."""
     return ("" if v != v else str(int(v)) if v.is_integer() and abs(v) < 1e15 and (v or str(v) == "0.0") else repr(v)
             for v in values.tolist())  # fmt: skip
 

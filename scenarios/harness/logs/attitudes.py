@@ -49,13 +49,13 @@ def attitude(table: Mapping[str, Array]) -> Array | None:
 def reasons(table: Mapping[str, Array], R_eb: Array) -> tuple[NDArray[np.bool_], list[tuple[NDArray[np.bool_], str]]]:
     """Rows in which the file holds something of an attitude, and why some of them hold none; see `accounts.samples`."""
     values = np.column_stack([table[name] for name in form_of(table)])
-    complete = np.isfinite(values).all(axis=1)
-    unknown = ~np.isfinite(R_eb).all(axis=(1, 2))
-    zeros = complete & (values == 0.0).all(axis=1)
-    why = [
+    complete = np.asarray(np.isfinite(values).all(axis=1))
+    unknown = np.asarray(~np.isfinite(R_eb).all(axis=(1, 2)))
+    zeros = np.asarray(complete & (values == 0.0).all(axis=1))
+    why: list[tuple[NDArray[np.bool_], str]] = [
         (~complete, accounts.NO_NUMBER), (unknown & zeros, NOT_STARTED), (unknown, NO_ROTATION),
     ]  # fmt: skip
-    return np.isfinite(values).any(axis=1), why
+    return np.asarray(np.isfinite(values).any(axis=1)), why
 
 
 def mend_angles(table: Table) -> bool:

@@ -28,6 +28,7 @@ FASTEST_HZ = 20_000.0
 BUSIEST_RAD_S = 3.0  # no aeroplane turns faster for half of a log
 FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
+_PERIODS = (2.0**16, 86400.0, 604800.0, 86400.0e3, 604800.0e3, 2.0**32)  # of counters, days and weeks in s and ms
 _DEGREES = 180.0 / np.pi
 _ARRIVALS = (
     ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s")),
@@ -71,6 +72,24 @@ def clock_factor(t_s: Array, source: Source, repairs: list[str]) -> float:
             repairs.append(f"{source.column('time')} in {name}, not seconds: converted")
             return factor
     return 1.0
+
+
+def unwrapped(ticks: Array) -> Array:
+    """Times of a counter that begins anew at a power of two, at the end of a day or of a week: continued.
+
+    ticks : shape (N,), in the unit of the file
+    """
+    good = np.flatnonzero(np.isfinite(ticks))
+    if len(good) < 2:
+        return ticks
+    before, after, largest = ticks[good[:-1]], ticks[good[1:]], float(ticks[good].max())
+    for period in _PERIODS:
+        back = (before > 0.99 * period) & (after < 0.01 * period)
+        if largest <= period and back.any():
+            turns = np.zeros(len(ticks))
+            turns[good[1:][back]] = period
+            return np.asarray(ticks + np.cumsum(turns))
+    return ticks
 
 
 def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list[str]) -> NDArray[np.intp]:

@@ -47,6 +47,7 @@ MAPS = Path(__file__).with_name("maps")  # maps that come with the package, name
 Kind = Literal["truth", "filter", "firmware"]
 _KEYS = ("columns", "delimiter", "decimal", "skip_lines", "names", "struct", "axes", "force_reversed", "reference",
          "origin_deg", "instruments", "suits")  # fmt: skip
+_ENTRIES = ("is", "unit", "factor", "offset")
 _DIRECTIONS = {  # of a sensor axis -> its unit vector in the body: forward, right, down
     "forward": (1, 0, 0), "back": (-1, 0, 0), "right": (0, 1, 0), "left": (0, -1, 0), "down": (0, 0, 1),
     "up": (0, 0, -1),
@@ -177,13 +178,13 @@ def _number(value: Any, key: str, where: str) -> float:
 
 
 def _check_twice(columns: Mapping[str, Meaning], path: Path) -> None:
-    """One column for each quantity; where columns are of several matrices, each may have a time of its own."""
-    seen: dict[tuple[str, str], str] = {}
+    """One column for each quantity, but for the time: columns of another length have one of their own."""
+    seen: dict[str, str] = {}
     for column, meaning in columns.items():
-        key = (matrix_of(column) if meaning.quantity == "time" else "", meaning.quantity)
-        if key in seen:
-            raise LogError(f"{path}: {meaning.quantity} is the meaning of two columns, {seen[key]} and {column}")
-        seen[key] = column
+        quantity = meaning.quantity
+        if quantity in seen and quantity != "time":
+            raise LogError(f"{path}: {quantity} is the meaning of two columns, {seen[quantity]} and {column}")
+        seen[quantity] = column
 
 
 def matrix_of(column: str) -> str:

@@ -32,31 +32,34 @@ class Reports:
     place: tuple[float, float] | None
 
 
-def reports(table: Mapping[str, Array], told: frozenset[str], repairs: list[str]) -> Reports | None:
+def reports(
+    table: Mapping[str, Array], told: frozenset[str], repairs: list[str], *, each: bool = False
+) -> Reports | None:
     """The reports in the rows of `table`, which are in order of time; None without any column of them.
 
     told : quantities whose unit somebody said: the others are judged by their values
+    each : every row is a report, none is held: the receiver has times of its own
     """
     names = [name for name in table if name.startswith("gps.") and name not in _FLAGS]
     if not names:
         return None
     columns = np.column_stack([table[name] for name in names])
     n = len(columns)
-    read = _read(table, columns)
+    read = np.isfinite(columns).any(axis=1) if each and "gps.new" not in table else _read(table, columns)
     lost = table["gps.fix"] < LEAST_FIX if "gps.fix" in table else np.zeros(n, np.bool_)
     velocity = _velocity(table, told)
-    why = [(lost, accounts.NO_FIX)]
+    why: list[tuple[NDArray[np.bool_], str]] = [(np.asarray(lost), accounts.NO_FIX)]
     if velocity is None:
         repairs.append("GPS without a velocity (gps.vn and gps.ve, or gps.speed and gps.course): not used")
         why.append((np.ones(n, np.bool_), accounts.NO_VELOCITY))
         velocity = np.full((n, 5), np.nan)
     if "gps.latitude" in table:
-        why.append((table["gps.latitude"] == 0.0, accounts.NO_FIX))
-    why.append((~np.isfinite(velocity).all(axis=1), accounts.NO_NUMBER))
+        why.append((np.asarray(table["gps.latitude"] == 0.0), accounts.NO_FIX))
+    why.append((np.asarray(~np.isfinite(velocity).all(axis=1)), accounts.NO_NUMBER))
     good = read & ~np.any([where for where, _ in why], axis=0)
     position, place = _position(table, told, good, repairs)
     stamps = table.get("gps.time", np.full(n, np.nan))
-    return Reports(read, why, np.column_stack((position, velocity, stamps)), lost, place)
+    return Reports(np.asarray(read), why, np.column_stack((position, velocity, stamps)), np.asarray(lost), place)
 
 
 def _read(table: Mapping[str, Array], columns: Array) -> NDArray[np.bool_]:

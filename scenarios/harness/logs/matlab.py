@@ -16,6 +16,8 @@ from estimator.interface import Array
 from scenarios.harness.logs import ardupilot_matlab, tabular
 from scenarios.harness.logs.checks import Source
 from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
+from scenarios.harness.logs.column_names import automatic
+from scenarios.harness.logs.quantities import Meaning
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 
 LABELS = "_label"  # behind the name of a matrix: the array of its columns' names
@@ -40,8 +42,7 @@ def read(path: Path, columns: ColumnMap | None = None) -> RecordedLog:
     if columns is None:
         columns = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), None)
     found, columns = _columns(path, content, columns or ColumnMap())
-    log = tabular.recorded(found, columns, Source(path, offered=_offered(found)), matrix_of)
-    return replace(log, repairs=log.repairs)
+    return tabular.recorded(found, columns, Source(path, offered=_offered(found)), matrix_of)
 
 
 def groups(path: Path) -> tuple[list[tabular.Group], Source, tuple[str, ...]]:
@@ -66,8 +67,9 @@ def _content(path: Path) -> dict[str, Any]:
     except Exception as error:  # scipy raises whatever its parser meets in a file cut off or foreign
         raise LogError(f"{path}: cannot be read as a MATLAB file: {' '.join(str(error).split())}") from error
     objects = [name for name, v in content.items() if type(v).__name__ in ("MatlabOpaque", "MatlabFunction")]
-    if objects and len(objects) == len(content):
-        raise LogError(f"{path}: {', '.join(objects)}: an object of MATLAB, a table or a time series: {_OBJECTS}")
+    if objects and not any(np.asarray(v).dtype.kind in "fiubV" for n, v in content.items() if n not in objects):
+        names = ", ".join(name for name in objects if name != "None") or "it"
+        raise LogError(f"{path}: {names} holds objects of MATLAB (tables, time series, maps): {_OBJECTS}")
     return {name: v for name, v in content.items() if name not in objects}
 
 
@@ -132,14 +134,41 @@ def _columns(path: Path, content: dict[str, Any], how: ColumnMap) -> tuple[dict[
     if not columns:
         shown = ", ".join(f"{name} ({_shape(v)})" for name, v in content.items()) or "nothing"
         raise LogError(f"{path}: no column of numbers{at}; it has {shown}")
-    if not how.columns:  # by names: of the structures that hold no vector that long none is meant
-        how = how.of(columns)
+    if not how.columns:
+        found, rivals = _recognised(columns)
+        how = replace(how, columns=found, rivals=rivals)
     if not how.columns:
         raise LogError(
             f"{path}: no column whose name is understood; it has {', '.join(_offered(columns))}: name them in a column "
             'map (--columns MAP.toml), a column of a matrix as "name[0]"'
         )
     return columns, how
+
+
+def _recognised(columns: Mapping[str, Array]) -> tuple[dict[str, Meaning], dict[str, tuple[str, ...]]]:
+    """Meanings of the columns by their names, matrix by matrix: each has its own clock.
+
+    A name counts with that of its structure (``imu.gyro[0]``), and where that means nothing alone (``flight.p``).
+    """
+    parts: dict[tuple[str, int], list[str]] = {}
+    for name, values in columns.items():
+        parts.setdefault((matrix_of(name.partition("[")[0]), len(values)), []).append(name)
+    chosen, rivals = dict[str, Meaning](), dict[str, tuple[str, ...]]()
+    owner: dict[str, str] = {}
+    for (prefix, _), names in parts.items():
+        found, competing = automatic(names)
+        short = {name.removeprefix(f"{prefix}."): name for name in names if name not in found}
+        taken = {m.quantity for m in found.values()}
+        local, _ = automatic(short)
+        found |= {short[name]: m for name, m in local.items() if m.quantity not in taken}
+        rivals |= competing
+        for name, meaning in found.items():
+            other = owner.setdefault(meaning.quantity, name)
+            if other == name or meaning.quantity == "time":
+                chosen[name] = meaning
+            else:
+                rivals[meaning.quantity] = other, name
+    return chosen, rivals
 
 
 def _flat(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Array]]:

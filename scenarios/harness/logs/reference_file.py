@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.interface import Array
 from estimator.screening import LONGEST_GAP_S
@@ -45,6 +46,7 @@ def of_table(
     t_s = factor * t_s
     of_file = checks.Source(path, source.columns, lambda k: source.row(int(known[k])))
     mended: list[str] = []
+    known = _in_order(t_s, known, source, mended)
     keep = known[checks.kept(t_s[known], {"attitude": np.ones(len(known))}, of_file, mended)]
     repairs += [f"{path.name}: {line}" for line in mended]
     first, last = float(t_s[keep[0]]), float(t_s[keep[-1]])
@@ -61,7 +63,24 @@ def of_table(
     ]  # fmt: skip
     good = accounts.samples(ledger, "reference", read, why)
     ledger.use("reference", int(good.sum()))
-    return attitudes.at_times(t_s[keep], R_eb[keep], rows_s)
+    found_R_eb = attitudes.at_times(t_s[keep], R_eb[keep], rows_s)
+    if not np.isfinite(found_R_eb).any():
+        usual_s = float(np.median(np.diff(t_s[keep]))) if len(keep) > 1 else 0.0
+        raise LogError(
+            f"{path}: its {len(keep)} attitudes are {usual_s:.3g} s apart; they are interpolated where they are at "
+            f"most {LONGEST_GAP_S:g} s apart, and no row of the log lies there"
+        )
+    return found_R_eb
+
+
+def _in_order(t_s: Array, known: NDArray[np.intp], source: checks.Source, repairs: list[str]) -> NDArray[np.intp]:
+    """`known` in order of time, where no time is there twice: two flights in one file would share some."""
+    times = t_s[known]
+    late = int(np.sum(np.diff(times) < 0.0))
+    if not late or len(np.unique(times)) < len(times):
+        return known
+    repairs.append(f"{source.column('time')}: {late} out of order, sorted")
+    return np.asarray(known[np.argsort(times, kind="stable")])
 
 
 def _factor(t_s: Array, rows_s: Array, source: checks.Source, repairs: list[str]) -> float:
@@ -69,14 +88,18 @@ def _factor(t_s: Array, rows_s: Array, source: checks.Source, repairs: list[str]
     t_s = t_s[np.isfinite(t_s)]
     if not len(t_s):
         raise source.refusal(None, "time", "no number in it")
+    step_s, length_s = float(np.median(np.diff(np.sort(t_s)))) if len(t_s) > 1 else 0.0, float(rows_s[-1] - rows_s[0])
     for factor, name in _UNITS:
         first, last = factor * float(t_s.min()), factor * float(t_s.max())
-        shared = min(last, rows_s[-1]) - max(first, rows_s[0])
-        if shared > 0.1 * min(last - first, float(rows_s[-1] - rows_s[0])):
-            if factor != 1.0:
-                repairs.append(f"{source.path.name}: {source.column('time')} in {name}, not seconds: converted")
+        if min(last, rows_s[-1]) <= max(first, rows_s[0]):
+            continue
+        if factor == 1.0:
             return factor
-    return checks.clock_factor(t_s, source, repairs)
+        # Times of another clock may overlap in a unit that is not theirs: then they are far too dense and too short.
+        if factor * step_s > 1.0 / checks.FASTEST_HZ and last - first > 0.1 * length_s:
+            repairs.append(f"{source.path.name}: {source.column('time')} in {name}, not seconds: converted")
+            return factor
+    return 1.0
 
 
 def of_log(path: Path, other: RecordedLog, rows_s: Array, ledger: Ledger) -> tuple[Array, Kind]:

@@ -5,6 +5,7 @@ file holds these in matrices of their own, each has its own times; a report is p
 before its own, and of several in one row the last one counts.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -22,6 +23,7 @@ from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.quantities import EULER, FIELD, INERTIAL
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.units import COUNTS
 from scenarios.harness.logs.validity import usable
 
 Table = dict[str, Array]
@@ -36,11 +38,12 @@ REMEDY = (
 class Group:
     """Columns of one length with times in common, by our names and in our units.
 
-    told : quantities whose unit somebody said
+    told : quantities whose unit somebody said      own : its clock is not that of the inertial unit: no value is held
     """
 
     table: Table
     told: frozenset[str] = frozenset()
+    own: bool = False
 
     @property
     def n(self) -> int:
@@ -88,6 +91,8 @@ def take(
         if m.quantity in table:
             raise LogError(f"{source.path}: {m.quantity} is the meaning of two columns, {own[m.quantity]} and {name}")
         # Without an offset nothing is subtracted: a number in our unit stays bit for bit.
+        if m.quantity == "time":
+            values = checks.unwrapped(values)
         table[m.quantity] = m.factor * (values - m.offset) if m.offset else m.factor * values
         told.setdefault(part, set()).update({m.quantity} if m.told else ())
         own.setdefault(m.quantity, name)
@@ -103,6 +108,11 @@ def take(
 
 def _with_times(parts: Mapping[tuple[str, int], Group], source: checks.Source) -> list[Group]:
     """One group for each clock: columns without a time of their own join those of the same length that have one."""
+    lengths = {n for (_, n), part in parts.items() if part.has("time")}
+    for (_, n), part in parts.items():
+        if n not in lengths and part.has("gps.time"):  # the one clock that these columns have
+            part.table["time"] = part.table.pop("gps.time")
+            part.told |= {"time"} & {q.replace("gps.time", "time") for q in part.told}
     groups = {key: part for key, part in parts.items() if part.has("time")}
     for key, part in parts.items():
         if key in groups:
@@ -175,7 +185,8 @@ def recorded(
     rows["baro_height_m"] = np.nan
     for group in groups:
         order = np.argsort(group.table["time"], kind="stable")  # what has no time comes last
-        group = Group({name: values[order] for name, values in group.table.items()}, group.told)
+        in_order = {name: values[order] for name, values in group.table.items()}
+        group = Group(in_order, group.told, group is not main)
         _take_fixes(made, group)
         _take_field(made, group)
         _take_air(made, group)
@@ -205,9 +216,18 @@ def _main(groups: list[Group], source: checks.Source) -> Group:
     if main is None or missing:
         raise LogError(
             f"{source.path}: no column for {', '.join(missing)}; it has {', '.join(source.offered)}: "
-            "name them in a column map (--columns MAP.toml)"
+            f"name them in a column map (--columns MAP.toml){_counts(source.offered, missing[0] if missing else '')}"
         )
     return main
+
+
+def _counts(offered: tuple[str, ...], missing: str) -> str:
+    """What to write for a column that counts, whose unit only its maker knows."""
+    for name in offered:
+        inside = re.search(r"[(\[]\s*([^)\]]+?)\s*[)\]]", name)
+        if inside and inside[1].lower() in COUNTS:
+            return f', one in {inside[1]} as "{name}" = {{ is = "{missing}", unit = "deg/s", factor = 0.07 }}'
+    return ""
 
 
 def interpolated(t_s: Array, times: Array, values: Array) -> Array:
@@ -276,7 +296,7 @@ def _held(values: Array, last: NDArray[np.intp], before: float = 0.0) -> Array:
 def _take_fixes(made: _Making, group: Group) -> None:
     """Fill the GPS columns."""
     rows, table, t_s = made.rows, group.table, group.table["time"]
-    found = fixes.reports(table, group.told, made.repairs)
+    found = fixes.reports(table, group.told, made.repairs, each=group.own)
     if found is None:
         return
     new, last = _put(made, "gps", t_s, found.read, found.reasons)
@@ -317,12 +337,13 @@ def _take_field(made: _Making, group: Group) -> None:
         return
     field_ut = np.column_stack([group.table[name] for name in FIELD])
     if group.has("mag.new"):
-        read = np.asarray(group.table["mag.new"] > 0.0)
+        read: NDArray[np.bool_] = np.asarray(group.table["mag.new"] > 0.0)
     else:
         there = np.isfinite(field_ut)
         changed = np.any(there[1:] & (field_ut[1:] != field_ut[:-1]), axis=1)
-        read = np.concatenate((there[:1].any(axis=1), changed))
-    broken = ~np.isfinite(field_ut).all(axis=1)
+        first = there[:1].any(axis=1)
+        read = np.asarray(there.any(axis=1)) if group.own else np.concatenate((first, changed))
+    broken = np.asarray(~np.isfinite(field_ut).all(axis=1))
     new, last = _put(made, "magnetometer", group.table["time"], read, [(broken, accounts.NO_NUMBER)])
     made.rows["mag_new"] |= new
     made.rows["mag_b_ut"] = _held(np.where(broken[:, None], 0.0, field_ut), last)

@@ -36,6 +36,7 @@ def _found(table: text_table.TextTable, path: Path) -> Source:
     if not table.meanings.columns:
         names = ", ".join(table.header)
         raise LogError(
-            f"{path}: no column whose name is understood; it has {names}: name them in a column map (--columns MAP.toml)"
+            f"{path}: no column whose name is understood; it has {names}: "
+            "name them in a column map (--columns MAP.toml)"
         )
     return Source(path, row=lambda k: f"line {table.lines[k]}", offered=table.header)

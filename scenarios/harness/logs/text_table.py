@@ -63,8 +63,10 @@ def read(path: Path, how: ColumnMap) -> TextTable:
     remarks = [i for i in at if lines[i].lstrip().startswith(REMARKS)]
     remark = set(remarks)
     at = [i for i in at if i not in remark]
-    delimiter = how.delimiter or _delimiter(path, [lines[i] for i in at[: _SAMPLE + 2]])
+    delimiter = how.delimiter or _delimiter(path, [lines[i] for i in at])
     cells = _cells(path, [lines[i] for i in at], delimiter)
+    above = 0 if how.names else _above_header(cells)
+    cells, at = cells[above:], at[above:]
     header, at, cells = _header(path, how, lines, (remarks, at), cells, delimiter)
     header, cells = _trimmed(header, cells)
     of_units = dict[str, str]()
@@ -75,8 +77,8 @@ def read(path: Path, how: ColumnMap) -> TextTable:
         raise LogError(f"{path}: no row of numbers: a header and rows of numbers are needed")
     meanings = how.of(header, of_units)
     _check_names(path, header, meanings, at[0])
-    decimal = how.decimal or _decimal(path, cells, delimiter)
-    notes, cut = [], 0
+    decimal = how.decimal or _decimal(path, cells)
+    notes, cut = [f"{above} lines above the header passed over"] if above else [], 0
     if len(cells[-1]) < len(header) or (len(cells) > 1 and _cut_cell(cells[-1], cells[-2])):
         notes.append(f"line {at[-1] + 1}, the last, was cut off: left out")
         cells, at, cut = cells[:-1], at[:-1], 1
@@ -119,7 +121,7 @@ def _delimiter(path: Path, lines: Sequence[str]) -> str:
     """What stands between the cells: the first that divides the rows alike."""
     if not lines:
         raise LogError(f"{path}: 0 lines; a header and rows of numbers are needed")
-    rows = lines[1:] or lines
+    rows = lines[1:][-_SAMPLE:] or lines  # the last ones: above them there may be a page about the logger
     for delimiter in DELIMITERS:
         widths = [len(row) for row in csv.reader(rows, delimiter=delimiter)]
         usual = max(set(widths), key=widths.count) if widths else 0
@@ -138,6 +140,16 @@ def _cells(path: Path, lines: Sequence[str], delimiter: str) -> list[list[str]]:
     if len(cells) != len(lines):
         raise LogError(f"{path}: a quotation mark that opens and does not close")
     return cells
+
+
+def _above_header(cells: list[list[str]]) -> int:
+    """How many lines stand above a header of names: those that have another number of cells than the rows."""
+    widths = [len(row) for row in cells[1:][-_SAMPLE:]]
+    usual = max(set(widths), key=widths.count) if widths else 0
+    for i, row in enumerate(cells[:-1]):
+        if len(row) == usual:
+            return i if i and not _is_numeric(row) else 0
+    return 0
 
 
 def _header(
@@ -167,8 +179,8 @@ def _header(
     if not cells:
         raise LogError(f"{path}: 0 lines; a header and rows of numbers are needed")
     raise LogError(
-        f"{path}: line {at[0] + 1} holds numbers and there is no header: write the names of its {len(cells[0])} columns "
-        'in a line above, or in a column map as names = ["t", "gx", ...]'
+        f"{path}: line {at[0] + 1} holds numbers and there is no header: write the names of its {len(cells[0])} "
+        'columns in a line above, or in a column map as names = ["t", "gx", ...]'
     )
 
 
@@ -207,10 +219,8 @@ def _check_width(path: Path, header: Sequence[str], cells: list[list[str]], at: 
         raise LogError(f"{path}: line {i + 1}: {len(row)} cells; the header has {len(header)}{hint}")
 
 
-def _decimal(path: Path, cells: list[list[str]], delimiter: str) -> str:
+def _decimal(path: Path, cells: list[list[str]]) -> str:
     """The decimal sign of the first lines; LogError where both occur."""
-    if delimiter == ",":
-        return "."
     seen = [cell for row in cells[:_SAMPLE] for cell in row]
     commas = [cell for cell in seen if re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell)]
     points = [cell for cell in seen if re.fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", cell)]
@@ -235,7 +245,7 @@ def _numbers(path: Path, column: list[str], name: str, decimal: str, where: Call
         if cell.lower() in NOTHING:
             continue
         try:
-            values[k] = float(cell)
+            values[k] = float(re.sub(r"(?<=\d)[dD](?=[-+]?\d)", "e", cell))  # Fortran's 1.0D-03
         except ValueError:
             raise LogError(f"{path}: {where(k)}, column {name}: {cell!r} is no number") from None
     return values

@@ -50,7 +50,7 @@ _SPELLED: dict[str, dict[str, str]] = {  # dimension -> spelling -> unit, beside
 }  # fmt: skip
 
 _SYNONYMS = (
-    ("[µμ]", "u"), ("[°º]", "deg"), ("²|⁽²⁾", "^2"), ("⁻¹", "^-1"), (r"\*\*", "^"), ("[·⋅×]", "*"),
+    ("[µμ]", "u"), ("[°º]", "deg"), ("²|⁽²⁾", "^2"), ("⁻¹", "^-1"), (r"\*\*", "^"), ("[·⋅\u00d7]", "*"),
     (r"\bper\b", "/"), ("milli", "m"), ("micro", "u"), ("nano", "n"), ("centi", "c"), ("kilo", "k"),
     ("degrees?", "deg"), ("radians?", "rad"), ("sec(ond)?s?", "s"), ("met(er|re)s?", "m"), ("tesla", "t"),
     (r"\b(knots?|kts?)\b", "kn"), (r"\b(feet|foot)\b", "ft"), (r"\b(hours?|hr)\b", "h"), (r"\bmiles?\b", "mi"),
