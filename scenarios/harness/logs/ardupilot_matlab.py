@@ -1,7 +1,7 @@
 """ArduPilot's logs as MATLAB files: IMU, GPS, MAG, ARSP, BARO and the attitude.
 
-A message is a matrix ``IMU`` with its ``IMU_label``, as Mission Planner writes it, or a structure ``IMU`` of vectors, as
-pymavlink's mavlogdump does.
+A message is a matrix ``IMU`` with its ``IMU_label``, as Mission Planner writes it, or a structure ``IMU`` of vectors,
+as pymavlink's mavlogdump does.
 
 Each message has its own times; see `streams` for how they become rows.  Units are those that ArduPilot's messages have
 of old: degrees, milligauss, rad/s.

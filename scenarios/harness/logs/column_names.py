@@ -74,6 +74,9 @@ _SCALARS: tuple[tuple[frozenset[str], str], ...] = tuple(
 )  # fmt: skip
 
 
+_UNTOLD = 20  # added to the rank of a clock that does not tell its unit
+
+
 class Heard(NamedTuple):
     """What a name may mean: the quantity, a factor to our unit, whether the name tells the unit, and words left over.
 
@@ -133,8 +136,8 @@ def meanings(header: str, unit: str = "") -> list[Heard]:
             factor = units.factor_of(spelled, _dimension(quantity)) if spelled else 1.0
             if factor is not None:
                 told = bool(spelled) or sign not in (1.0, -1.0)
-                better = 0 if told or quantity != "time" else 1  # of two clocks the one that tells its unit
-                found[quantity] = Heard(quantity, sign * factor, told, 2 * rank + better, stem)
+                worse = 0 if told or quantity != "time" else _UNTOLD  # of two clocks the one that tells its unit
+                found[quantity] = Heard(quantity, sign * factor, told, rank + worse, stem)
     return sorted(found.values(), key=lambda heard: heard.rank)
 
 
@@ -347,15 +350,15 @@ def _best_stems(group: tuple[str, ...], heard: Mapping[str, list[tuple[str, Hear
     """The stems of the best rank that name most of the vector; None for a single quantity."""
     if len(group) == 1:
         return None
-    ranks: dict[str, tuple[int, int]] = {}
+    ranks: dict[str, dict[str, int]] = {}
     for quantity in group:
         for _, one in heard.get(quantity, []):
-            n, rank = ranks.get(one.stem, (0, 0))
-            ranks[one.stem] = n + 1, max(rank, one.rank)
+            of_stem = ranks.setdefault(one.stem, {})
+            of_stem[quantity] = min(one.rank, of_stem.get(quantity, one.rank))
     if not ranks:
         return set()
-    most = min((-n, rank) for n, rank in ranks.values())
-    found = {stem for stem, (n, rank) in ranks.items() if (-n, rank) == most}
+    most = min((-len(named), max(named.values())) for named in ranks.values())
+    found = {stem for stem, named in ranks.items() if (-len(named), max(named.values())) == most}
     if -most[0] < len(group):  # spread over several stems: no one of them is the vector
         return set(ranks)
     return found

@@ -100,7 +100,7 @@ def take(
         own[vector] = " ".join(own[name] for name in (f"{vector}.{a}" for a in "xyz") if name in own) or vector
     groups = _with_times({key: Group(table, frozenset(told[key])) for key, table in parts.items()}, source)
     for group in groups:
-        _turn(group, meanings)
+        turn(group, meanings)
         if not group.told & set(EULER):
             attitudes.mend_angles(group.table)
     return groups, replace(source, columns=own, remedy=REMEDY)
@@ -135,7 +135,7 @@ def _with_times(parts: Mapping[tuple[str, int], Group], source: checks.Source) -
     return list(groups.values())
 
 
-def _turn(group: Group, meanings: ColumnMap) -> None:
+def turn(group: Group, meanings: ColumnMap) -> None:
     """Axes of the body, and the sign of a specific force, as the map says."""
     table, R_bs = group.table, meanings.R_bs
     if meanings.force_reversed:
