@@ -235,7 +235,7 @@ def test_counter_that_begins_anew_goes_on(held, write, period, per_s):
     [("forward-left-up", (1, -1, -1)), ("right-forward-up", None), ("force-reversed", "force")],
 )
 def test_remedies_of_the_refusal_work(held, write, columns, axes, tmp_path):
-    """Axes that point up and a reversed accelerometer are refused, and each remedy brings the rows of the plain file."""
+    """Axes that point up and a reversed accelerometer are refused; each remedy brings the rows of the plain file."""
     table, level = held.columns(attitude=False), write(held.lines(held.columns(attitude=False)))
     gyro, force = (np.column_stack([table[f"{v}{a}"] for a in "xyz"]) for v in "ga")
     if axes == "force":

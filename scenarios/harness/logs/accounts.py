@@ -61,31 +61,39 @@ def samples(ledger: Ledger, stream: str, read: NDArray[np.bool_], reasons: Itera
     return good
 
 
-def arrivals(ledger: Ledger, read: NDArray[Any], moved: NDArray[Any], used: NDArray[Any]) -> None:
-    """Account for what arrived in measured rows: as read, with the arrivals of rows left out moved on, and as used.
+def arrivals(ledger: Ledger, read: NDArray[Any], used: NDArray[Any]) -> None:
+    """Account for what arrived in measured rows, as they were `read` and as they are `used`, in order of time.
 
-    Streams that are in the `ledger` have been read, and what a reader left out is in it.
+    What arrived in a row that was left out arrives with the next.  Streams that are in the `ledger` have been read,
+    and what a reader left out is in it.
     """
-    for (stream, n), placed, good in zip(_arrived(read).items(), _arrived(moved).values(), _arrived(used).values(),
-                                         strict=True):  # fmt: skip
+    at = np.searchsorted(used["t_s"], read["t_s"])  # what has no time comes after all
+    final = _arrived(used)
+    for stream, there in _arrived(read).items():
         if stream not in ledger:
-            if not n:
+            if not there.any():
                 continue
-            ledger.read(stream, n)
-        ledger.leave_out(stream, n - placed, IN_ONE_ROW)
-        ledger.leave_out(stream, placed - good, NO_NUMBER)
+            ledger.read(stream, int(there.sum()))
+        timed = there & np.isfinite(read["t_s"])
+        ledger.leave_out(stream, int(np.sum(there & ~timed)), NO_TIME)
+        ledger.leave_out(stream, int(np.sum(timed & (at >= len(used)))), AFTER)
+        rows = at[timed & (at < len(used))]
+        placed = np.unique(rows)
+        good = int(np.sum(final[stream][placed]))
+        ledger.leave_out(stream, len(rows) - len(placed), IN_ONE_ROW)
+        ledger.leave_out(stream, len(placed) - good, NO_NUMBER)
         ledger.use(stream, good)
 
 
-def _arrived(rows: NDArray[Any]) -> dict[str, int]:
-    """How much arrived in measured rows, by stream; air data by the numbers that they hold."""
+def _arrived(rows: NDArray[Any]) -> dict[str, NDArray[np.bool_]]:
+    """In which of the measured rows something arrived, by stream; air data by the numbers that they hold."""
     air = rows["air_new"] > 0
     height = np.isfinite(rows["baro_height_m"])
     return {
-        "gps": int(np.sum(rows["gps_new"] > 0)),
-        "magnetometer": int(np.sum(rows["mag_new"] > 0)),
-        "airspeed": int(np.sum(air & (np.isfinite(rows["airspeed_m_s"]) | ~height))),
-        "barometer": int(np.sum(air & height)),
+        "gps": np.asarray(rows["gps_new"] > 0),
+        "magnetometer": np.asarray(rows["mag_new"] > 0),
+        "airspeed": np.asarray(air & (np.isfinite(rows["airspeed_m_s"]) | ~height)),
+        "barometer": np.asarray(air & height),
     }
 
 

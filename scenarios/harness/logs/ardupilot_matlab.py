@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.instruments import Known
 from estimator.interface import Array
@@ -20,6 +21,7 @@ from scenarios.harness.logs import accounts, properties, streams, tabular
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from scenarios.harness.logs.streams import Kind, Stream
+from scenarios.harness.logs.validity import usable
 
 GYRO, FORCE, FIELD = (tuple(f"{name}{axis}" for axis in "XYZ") for name in ("Gyr", "Acc", "Mag"))
 FIX_3D = 3.0  # GPS.Status
@@ -44,7 +46,7 @@ def read(path: Path, tables: Mapping[str, Table], content: Mapping[str, Any]) ->
     """
     repairs: list[str] = []
     inertial = _inertial(path, tables)
-    fixes, n_fixes = _fixes(tables)
+    fixes, n_fixes, lost_s = _fixes(tables)
     field = _stream(tables, "MAG", FIELD, healthy="Health")
     attitude, kind = _attitude(tables)
     found = streams.Messages(
@@ -62,6 +64,7 @@ def read(path: Path, tables: Mapping[str, Table], content: Mapping[str, Any]) ->
     log = streams.recorded(path, found, repairs)
     rows = log.rows.copy()
     rows["gps_t_s"] = np.nan  # when a fix was true is not in these messages
+    rows["gps_valid"] = usable(rows["gps_new"] > 0, rows["t_s"], _rows_at(lost_s, rows["t_s"]))
     rows.flags.writeable = False
     known = {**properties.measured(rows), **log.known, **_parameters(content)}
     if rows["gps_new"].any():
@@ -118,21 +121,30 @@ def _inertial(path: Path, tables: Mapping[str, Table]) -> Stream:
     return Stream(gyro.name, gyro.t_s, np.column_stack((gyro.values, *there)))
 
 
-def _fixes(tables: Mapping[str, Table]) -> tuple[Stream | None, int]:
-    """Fixes of three dimensions, with speed, course over ground and the vertical speed, which counts down; and how
-    many reports there were."""
+def _rows_at(times_s: Array, rows_s: Array) -> NDArray[np.bool_]:
+    """The rows into which messages of these times fall."""
+    at = np.searchsorted(rows_s, times_s)
+    there = np.zeros(len(rows_s), np.bool_)
+    there[at[at < len(rows_s)]] = True
+    return there
+
+
+def _fixes(tables: Mapping[str, Table]) -> tuple[Stream | None, int, Array]:
+    """Fixes of three dimensions, with speed, course over ground and the vertical speed, which counts down; how many
+    reports there were; and the times of those without a fix."""
     columns = ("Status", "Lat", "Lng", "Alt", "Spd", "GCrs")
     found = _chosen(tables, "GPS")
     vertical = ("VZ",) if found is not None and "VZ" in found[1] else ()
     gps = _stream(tables, "GPS", columns + vertical)
     if gps is None:
-        return None, 0
+        return None, 0, np.zeros(0)
     fixed = gps.values[:, 0] >= FIX_3D
     t_s, values = gps.t_s[fixed], gps.values[fixed]
     speed, course = values[:, 4], np.radians(values[:, 5])
     down = values[:, 6] if vertical else np.zeros(len(t_s))
     velocity = (speed * np.cos(course), speed * np.sin(course), down)
-    return Stream(gps.name, t_s, np.column_stack((values[:, 1:4], *velocity, t_s))), len(fixed)
+    stream = Stream(gps.name, t_s, np.column_stack((values[:, 1:4], *velocity, t_s)))
+    return stream, len(fixed), gps.t_s[~fixed]
 
 
 def _attitude(tables: Mapping[str, Table]) -> tuple[Stream | None, Kind]:

@@ -167,7 +167,7 @@ def mended(log: RecordedLog, path: Path) -> RecordedLog:
         if reference is not None:
             reference = replace(reference, R_eb=reference.R_eb[keep])
     found = judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
-    accounts.arrivals(log.ledger, log.rows, rows, found.rows)
+    accounts.arrivals(log.ledger, log.rows, found.rows)
     if log.reference is not None and reference is not None:
         accounts.reference(log.ledger, log.reference.known, int(reference.known.sum()))
     return found
