@@ -7,6 +7,7 @@ instruments: properties that are withheld, unknown or only assumed are not in it
 
 import csv
 import io
+import json
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import ours
+from scenarios.harness.logs import ours, properties
 from sim.log import Flight
 
 KNOWN_BY = ("set", "data sheet", "log")  # sources of a property that is knowledge
@@ -99,12 +100,14 @@ def to_map(found: list[Column], flight: Flight, name: str) -> str:
     """The column map of the log `name`, as TOML."""
     latitude_deg, longitude_deg = ours.place_of(flight)
     known = ours.known_of(flight)
+    hidden = [n for n in properties.MEASURED if n in known and known[n].source not in KNOWN_BY]
     lines = [
         f"# {name}: what its columns mean, and what is known of the instruments aboard.",
         'delimiter = ","',
         'decimal = "."',
         'reference = "truth"',
         f"origin_deg = [{latitude_deg!r}, {longitude_deg!r}]",
+        *([f"withheld = {json.dumps(hidden)}"] if hidden else []),
         "",
         "[columns]",
         *(f'{column.name} = "{column.meaning}"' for column in found),

@@ -136,6 +136,8 @@ def test_load_instruments_are_properties_or_parameters_of_an_estimator(tmp_path,
         ('axes = "north-east-down"', "say where x, y and z point"),
         ('force_reversed = "yes"', "must be true or false"),
         ('reference = "gold"', "reference = 'gold' must be truth, filter or firmware"),
+        ('withheld = ["gps_rate"]', "withheld 'gps_rate': did you mean gps_rate_hz"),
+        ('withheld = ["gps_rate_hz"]\n[instruments]\ngps_rate_hz = 4', "withheld 'gps_rate_hz': it has a value too"),
         ("origin_deg = [100, 0]", "must be a latitude and a longitude"),
     ],
 )

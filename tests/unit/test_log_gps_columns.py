@@ -158,8 +158,8 @@ def test_flags_say_what_arrived(held, read):
     ones = np.ones(held.n)
     new = {name: (np.arange(held.n) % every == 0) * 1.0 for name, every in (("gps", 10), ("mag", 5), ("air", 2))}
     log = read(
-        {"gps_new": new["gps"], "vn": 8.0 * ones, "ve": ones, "mag_new": new["mag"], "mx": 20.0 * ones, "my": 0.0 * ones,
-         "mz": 40.0 * ones, "air_new": new["air"], "airspeed": 9.0 * ones, "height": 3.0 * ones}
+        {"gps_new": new["gps"], "vn": 8.0 * ones, "ve": ones, "mag_new": new["mag"], "mx": 20.0 * ones,
+         "my": 0.0 * ones, "mz": 40.0 * ones, "air_new": new["air"], "airspeed": 9.0 * ones, "height": 3.0 * ones}
     )  # fmt: skip
     for name in new:
         np.testing.assert_array_equal(log.rows[f"{name}_new"], new[name])

@@ -134,8 +134,9 @@ INERTIAL = ("gyro.x", "gyro.y", "gyro.z", "force.x", "force.y", "force.z")
         (lambda h: {"data": np.column_stack((h.t_s, h.rate, h.force))}, columns_of(
             {f"data[{i}]": q for i, q in enumerate(("time", *INERTIAL))})),
         (lambda h: {"D": np.column_stack((1e3 * h.t_s, h.rate, h.force)),
-                    "D_label": cells(["ms", "a", "b", "c", "d", "e", "f"])}, columns_of(
-            {"D.ms": "time ms", "D[1]": "gyro.x", **{f"D.{n}": q for n, q in zip("bcdef", INERTIAL[1:], strict=True)}})),
+                    "D_label": cells(["ms", *"abcdef"])}, columns_of(
+            {"D.ms": "time ms", "D[1]": "gyro.x",
+             **{f"D.{n}": q for n, q in zip("bcdef", INERTIAL[1:], strict=True)}})),
         (lambda h: {"t": np.round(1e6 * h.t_s).astype("i8"), "gyro": h.rate, "acc": h.force}, None),
     ],
 )  # fmt: skip
@@ -192,7 +193,8 @@ def test_accelerometer_with_times_of_its_own_is_interpolated(tmp_path, held):
         (b"\x89HDF\r\n\x1a\n" + bytes(100), r"version 7\.3 \(HDF5\): save it again.*'-v7'"),
         ({"a": "words"}, r"no column of numbers; it has a \(str\)"),
         ({"data": np.ones((9, 7))}, r'no column whose name is understood; it has data\[0\] to \[6\].*as "name\[0\]"'),
-        ({"t": np.arange(9.0), "gyro": np.ones((9, 3))}, r"no column for force\.x, .*; it has t, gyro\[0\] to \[2\]: name"),
+        ({"t": np.arange(9.0), "gyro": np.ones((9, 3))},
+         r"no column for force\.x, .*; it has t, gyro\[0\] to \[2\]: name"),
         ({"t": np.arange(9.0), "g1": {"gyro": np.ones((9, 3))}, "g2": {"gyro": np.ones((9, 3))}},
          r"gyro\.x may be g1\.gyro\[0\] or g2\.gyro\[0\]"),
     ],

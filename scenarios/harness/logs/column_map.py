@@ -22,7 +22,7 @@ value = factor * (number in the file - offset), in that unit::
     [instruments]  # what is known of them, by the names of `estimator.instruments.PROPERTIES`
     gps_latency_s = 0.2
 
-Without a table ``[columns]`` the columns are recognised by their names, as they are without a map (`automatic`).
+``withheld = ["gps_rate_hz"]`` names properties that estimators are not to be told though the log shows them.  Without a table ``[columns]`` the columns are recognised by their names, as they are without a map (`automatic`).
 """
 
 import math
@@ -46,7 +46,7 @@ from scenarios.harness.plugins import near_misses
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
 Kind = Literal["truth", "filter", "firmware"]
 _KEYS = ("columns", "delimiter", "decimal", "skip_lines", "names", "struct", "axes", "force_reversed", "reference",
-         "origin_deg", "instruments", "suits")  # fmt: skip
+         "origin_deg", "instruments", "suits", "withheld")  # fmt: skip
 _ENTRIES = ("is", "unit", "factor", "offset")
 _DIRECTIONS = {  # of a sensor axis -> its unit vector in the body: forward, right, down
     "forward": (1, 0, 0), "back": (-1, 0, 0), "right": (0, 1, 0), "left": (0, -1, 0), "down": (0, 0, 1),
@@ -278,6 +278,14 @@ def _known(data: Mapping[str, Any], path: Path) -> dict[str, Known]:
             if not isinstance(value, int | float) or not math.isfinite(value):
                 raise LogError(f"{path}: [{table}] {name} = {value!r} must be a number, true or false")
             found[name] = Known(value, "log", path.name)
+    withheld = data.get("withheld", [])
+    if not isinstance(withheld, list):
+        raise LogError(f'{path}: withheld must be a list of properties, as in withheld = ["gps_rate_hz"]')
+    for name in withheld:
+        if name not in PROPERTIES or name in found:
+            why = "it has a value too" if name in found else near_misses(str(name), PROPERTIES)
+            raise LogError(f"{path}: withheld {name!r}: {why}")
+        found[name] = Known(PROPERTIES[name].assumed, "withheld", path.name)
     return found
 
 

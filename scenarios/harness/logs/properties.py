@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from estimator.instruments import Known
 
 
+MEASURED = ("imu_rate_hz", "gps_rate_hz", "gps_stamped", "gps_vertical_velocity")  # what any log shows by its rows
+
+
 def measured(rows: NDArray[Any]) -> dict[str, Known]:
     """Properties that can be measured in `rows`, by the names of `estimator.instruments.PROPERTIES`.
 
