@@ -147,7 +147,7 @@ def test_reference_on_another_clock_is_refused_with_both_spans(score, angles, sh
         (lambda a: {"t": a["t"], "foo": a["t"], "roll": a["roll"]}, "no time and attitude in it"),
         (lambda a: {n: v[::50] for n, v in a.items()}, r"its 10 attitudes are 1 s apart; they are interpolated where"),
         (lambda a: {n: np.concatenate((v, v)) for n, v in a.items()}, "runs back from 10 to 0.02 s"),
-        (lambda a: a | {n: 0.0 * a["t"] for n in ("roll", "pitch", "yaw")}, "no attitude in any of its 500 rows"),
+        (lambda a: a | dict.fromkeys(("roll", "pitch", "yaw"), 0.0 * a["t"]), "no attitude in any of its 500 rows"),
     ],
 )  # fmt: skip
 def test_reference_that_cannot_be_used_is_refused(score, angles, reference, said):

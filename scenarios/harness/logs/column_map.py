@@ -22,7 +22,8 @@ value = factor * (number in the file - offset), in that unit::
     [instruments]  # what is known of them, by the names of `estimator.instruments.PROPERTIES`
     gps_latency_s = 0.2
 
-``withheld = ["gps_rate_hz"]`` names properties that estimators are not to be told though the log shows them.  Without a table ``[columns]`` the columns are recognised by their names, as they are without a map (`automatic`).
+``withheld = ["gps_rate_hz"]`` names properties that estimators do not receive although the log shows them.  Without a
+table ``[columns]`` the columns are recognised by their names, as they are without a map (`automatic`).
 """
 
 import math

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from estimator.instruments import Known
 
-
 MEASURED = ("imu_rate_hz", "gps_rate_hz", "gps_stamped", "gps_vertical_velocity")  # what any log shows by its rows
 
 
