@@ -23,13 +23,21 @@ _STRONG = {  # words that name a vector whatever stands beside them
     "mag": {"mag", "magnetometer", "magnetic", "magn", "magnet"},
 }
 _PHRASES = {  # words that name it together
-    "gyro": ({"angular", "velocity"}, {"angular", "rate"}, {"rotation", "rate"}, {"angular", "vel"}, {"turn", "rate"}),
+    "gyro": (
+        {"angular", "velocity"},
+        {"angular", "rate"},
+        {"rotation", "rate"},
+        {"angular", "vel"},
+        {"turn", "rate"},
+        {"ang", "rate"},
+        {"ang", "vel"},
+    ),
     "force": ({"specific", "force"}, {"linear", "accel"}),
     "mag": ({"mag", "field"},),
 }
 _HELPING = {"gyro": {"rotation", "rate", "angular", "velocity"}, "force": {"specific", "linear"}, "mag": {"field"}}
-_WEAK = {"gyro": {"g", "w"}, "force": {"a", "f"}, "mag": {"m", "h"}}  # letters that name it alone with an axis
-_GLUED = re.compile(r"(gyro|gyr|omega|accel|acc|mag|magn|force|vel|[gwafmhv])([xyzned])|(q|quat)([wxyz])")
+_WEAK = {"gyro": {"g", "w"}, "force": {"a", "f"}, "mag": {"m", "h", "b"}}  # letters that name it alone with an axis
+_GLUED = re.compile(r"(gyro|gyr|omega|accel|acc|mag|magn|force|vel|[gwafmhvb])([xyzned])|(q|quat)([wxyz])")
 _NEUTRAL = {
     "imu", "sensor", "sensors", "data", "measured", "raw", "b", "body", "frame", "value", "values", "combined", "axis",
     "input", "reading", "motion", "adc", "smooth", "the", "of", "in", "field", "sens", "uncalibrated", "calibrated",
@@ -47,7 +55,7 @@ _TRUTH = {"ref", "reference", "truth", "true", "groundtruth", "att", "attitude",
           "est", "estimate", "estimated", "filter", "ekf", "orientation", "fused"}  # fmt: skip
 _TIME = {"t", "time", "timestamp", "clock", "ts", "stamp", "seconds", "secs", "elapsed", "uptime", "millis", "micros"}
 _TIME_BESIDE = {"since", "start", "boot", "system", "sys", "sample", "header", "logging", "up", "power", "relative",
-                "local", "from", "s", "reboot"}  # fmt: skip
+                "local", "startup", "from", "s", "reboot"}  # fmt: skip
 _ANGLES = {"roll": "roll", "phi": "roll", "pitch": "pitch", "theta": "pitch", "yaw": "yaw", "psi": "yaw",
            "heading": "yaw", "hdg": "yaw"}  # fmt: skip
 _SCALARS: tuple[tuple[frozenset[str], str], ...] = tuple(
@@ -59,7 +67,8 @@ _SCALARS: tuple[tuple[frozenset[str], str], ...] = tuple(
         "gps.time": "gps t|gps time|fix time|gps timestamp|gps fix time",
         "gps.latitude": "latitude|lat|gps lat|gps latitude",
         "gps.longitude": "longitude|lon|lng|long|gps lon|gps longitude|gps lng|gps long",
-        "gps.altitude": "altitude|alt|gps alt|gps altitude|gps height|alt msl|altitude msl|amsl|hmsl|gps alt msl",
+        "gps.altitude": "altitude|alt|gps alt|gps altitude|gps height|alt msl|altitude msl|amsl|hmsl|altitude asl"
+                        "|alt asl|altitude amsl|gps altitude msl|gps alt msl",
         "gps.speed": "gps speed|ground speed|groundspeed|gps ground speed|gps groundspeed|speed over ground|sog|gps spd"
                      "|spd|gspd|gps velocity|gps vel|ground velocity|gps gspeed|vel m s|gps velocity m s",
         "gps.course": "gps course|course|cog|ground course|gps ground course|gps cog|gps heading|course over ground"
@@ -101,14 +110,14 @@ class Name(NamedTuple):
 def split(header: str, unit: str = "") -> Name:
     """Take a header apart; `unit` is what a row of units below says."""
     indices = []
-    for inside in re.findall(r"[(\[{<]([^()\[\]{}<>]*)[)\]}>]", header):
+    for inside in re.findall(r"[(\[<]([^()\[\]<>]*)[)\]>]", header):
         if inside.strip().isdigit():
             indices.append(inside.strip())
         elif inside.strip().lower() in _AXES:
             header = header.replace(inside, f" {inside} ")  # an axis in brackets is a word
         elif units.is_unit(inside) or re.search(r"[/^]", inside):  # one that is unknown is no unit of ours either
             unit = unit or inside
-    bare = re.sub(r"[(\[{<](?!\s[xyzXYZ]\s)[^()\[\]{}<>]*[)\]}>]", " ", header)
+    bare = re.sub(r"[(\[<](?!\s[xyzXYZ]\s)[^()\[\]<>]*[)\]>]", " ", header)
     bare = re.sub(r"(?<![a-zA-Z])([unµμ])T(?![a-z])", lambda m: "ut" if m[1] != "n" else "nt", bare)
     words = re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+", bare)
     return Name(tuple(word.lower() for word in words), tuple(indices), unit)
@@ -200,7 +209,7 @@ def _vector(words: list[str], indices: tuple[str, ...]) -> Iterable[tuple[str, i
         others = set().union(*(s for n, s in _STRONG.items() if n != name))
         rest = set(bare) - _NEUTRAL - strong - _HELPING[name]
         by_words = strong & set(bare) or any(phrase <= set(bare) for phrase in _PHRASES[name])
-        letters = set(bare) - _NEUTRAL
+        letters = set(bare) - _NEUTRAL or set(bare) & {"b"}  # B is the field, where it is not the body's frame
         if by_words and not others & set(bare) and len(rest) <= 1:
             yield f"{name}.{axis}", 2 * len(rest) + 2 * len(instance), _stem(bare, instance), 1.0
         elif len(letters) == 1 and letters <= _WEAK[name] and not instance and not indices:

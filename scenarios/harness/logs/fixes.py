@@ -56,6 +56,10 @@ def reports(
     if "gps.latitude" in table:
         why.append((np.asarray(table["gps.latitude"] == 0.0), accounts.NO_FIX))
     why.append((np.asarray(~np.isfinite(velocity).all(axis=1)), accounts.NO_NUMBER))
+    if "gps.fix" in table and read.any() and lost[read].all():
+        repairs.append(
+            f"gps.fix is never {LEAST_FIX:g} or more: no fix is used; of a column that is only 0 or 1 say gps.valid"
+        )
     good = read & ~np.any([where for where, _ in why], axis=0)
     position, place = _position(table, told, good, repairs)
     stamps = table.get("gps.time", np.full(n, np.nan))

@@ -20,7 +20,7 @@ from scenarios.harness.logs.column_names import automatic
 from scenarios.harness.logs.quantities import Meaning
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 
-LABELS = "_label"  # behind the name of a matrix: the array of its columns' names
+LABELS = ("_label", "_labels", "_names", "_header")  # behind the name of a matrix: the array of its columns' names
 WIDEST = 64  # a matrix with more columns is no table
 _SAVE = "save it again with save('file.mat', '-v7')"
 _OBJECTS = (
@@ -83,7 +83,7 @@ def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Array]]:
     """Matrices with labels, and structures of vectors: name -> label -> column."""
     tables: dict[str, dict[str, Array]] = {}
     for name, value in content.items():
-        labels = _labels(content.get(f"{name}{LABELS}"))
+        labels = _labels(name, content)
         if labels and (matrix := _matrix(value, len(labels))) is not None:
             tables[name] = dict(zip(labels, matrix.T, strict=True))
         elif _is_struct(value):
@@ -94,9 +94,10 @@ def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Array]]:
     return tables
 
 
-def _labels(value: Any) -> list[str]:
-    """Names of columns, of a cell array or a matrix of characters."""
-    if value is None:
+def _labels(name: str, content: Mapping[str, Any]) -> list[str]:
+    """Names of the columns of the matrix `name`, of a cell array or a matrix of characters; none without one."""
+    value = next((content[f"{name}{end}"] for end in LABELS if f"{name}{end}" in content), None)
+    if value is None or np.asarray(value).dtype.kind not in "UO":
         return []
     cells = np.atleast_1d(np.asarray(value)).ravel()
     return [str(np.asarray(cell).item() if np.asarray(cell).size == 1 else cell).strip() for cell in cells]
@@ -188,7 +189,7 @@ def _flat(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Array
         if matrix.shape[1] == 1:
             found.append((f"{prefix}{name}", matrix[:, 0]))
             continue
-        labels = _labels(content.get(f"{name}{LABELS}"))
+        labels = _labels(name, content)
         if labels and (labelled := _matrix(value, len(labels))) is not None:
             found += [(f"{prefix}{name}.{label}", column) for label, column in zip(labels, labelled.T, strict=True)]
         found += [(f"{prefix}{name}[{j}]", column) for j, column in enumerate(matrix.T)]

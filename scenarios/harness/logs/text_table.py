@@ -30,6 +30,7 @@ NOTHING = frozenset(
 )
 _SAMPLE = 50  # lines that are looked at
 _DAY_S = 86400.0
+_NO_TIME = "is no number, no time of day (12:34:56.78) and no date (2026-07-02T12:34:56.78)"
 _CLOCK = re.compile(r"(\d{1,2}):([0-5]\d)(?::([0-5]?\d(?:[.,]\d*)?))?")
 
 
@@ -95,7 +96,8 @@ def read(path: Path, how: ColumnMap) -> TextTable:
             columns[name], note = _clock(path, column, name, lambda k: f"line {at[k] + 1}")
             notes.append(note)
         else:
-            columns[name] = _numbers(path, column, name, decimal, lambda k: f"line {at[k] + 1}")
+            what = _NO_TIME if name in of_time else "is no number"
+            columns[name] = _numbers(path, column, (name, what), decimal, lambda k: f"line {at[k] + 1}")
     return TextTable(columns, tuple(header), [i + 1 for i in at], meanings, tuple(notes), cut, of_units)
 
 
@@ -232,8 +234,11 @@ def _decimal(path: Path, cells: list[list[str]]) -> str:
     return "," if commas else "."
 
 
-def _numbers(path: Path, column: list[str], name: str, decimal: str, where: Callable[[int], str]) -> Array:
-    """The numbers of a column, NaN where there is none; LogError with line and column elsewhere."""
+def _numbers(path: Path, column: list[str], name: tuple[str, str], decimal: str, where: Callable[[int], str]) -> Array:
+    """The numbers of a column, NaN where there is none; LogError with line and column elsewhere.
+
+    name : of the column, and what to say of a cell that holds something else
+    """
     if decimal == ",":
         column = [cell.replace(".", "").replace(",", ".") for cell in column]
     try:
@@ -247,7 +252,7 @@ def _numbers(path: Path, column: list[str], name: str, decimal: str, where: Call
         try:
             values[k] = float(re.sub(r"(?<=\d)[dD](?=[-+]?\d)", "e", cell))  # Fortran's 1.0D-03
         except ValueError:
-            raise LogError(f"{path}: {where(k)}, column {name}: {cell!r} is no number") from None
+            raise LogError(f"{path}: {where(k)}, column {name[0]}: {cell!r} {name[1]}") from None
     return values
 
 
