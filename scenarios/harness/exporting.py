@@ -59,10 +59,13 @@ def parse_start(text: str | None) -> datetime:
     return start if start.tzinfo is not None else start.replace(tzinfo=gps_messages.START.tzinfo)
 
 
-def make(source: Path, nmea: Path | None, ubx: Path | None, start: datetime, csv: Path | None = None) -> Export:
+def make(
+    source: Path, nmea: Path | None = None, ubx: Path | None = None, start: datetime = gps_messages.START,
+    csv: Path | None = None,
+) -> Export:  # fmt: skip
     """Put the recording at `source` (as `view` takes it) into messages and a text log.
 
-    csv : of the text log, packed where it ends with .gz; its column map is written beside it, as .toml
+    start : UTC at power-up      csv : of the text log, packed where it ends with .gz; its column map is written beside it, as .toml
 
     Raises
     ------
