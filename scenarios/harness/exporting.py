@@ -65,7 +65,8 @@ def make(
 ) -> Export:  # fmt: skip
     """Put the recording at `source` (as `view` takes it) into messages and a text log.
 
-    start : UTC at power-up      csv : of the text log, packed where it ends with .gz; its column map is written beside it, as .toml
+    nmea, ubx, csv : where each will be written      start : UTC at power-up
+    The text log is packed where its name ends with .gz, and its column map is written beside it, as .toml.
 
     Raises
     ------

@@ -252,3 +252,61 @@ def test_remedies_of_the_refusal_work(held, write, columns, axes, tmp_path):
     found = logs.read(tmp_path / "other.csv", columns=columns)
     for name in ("gyro_b_rad_s", "force_b_m_s2"):
         np.testing.assert_array_equal(found.rows[name], level.rows[name])
+
+
+def test_instruments_in_rows_of_their_own_arrive_with_the_next_inertial_sample(held, write):
+    """Rows of the magnetometer and of the receiver between those of the inertial unit, empty cells in each."""
+    header = "t,gx,gy,gz,ax,ay,az,mx,my,mz,vn,ve"
+    rows = [(t, f"{t:.12g},{','.join(f'{v:.12g}' for v in (*w, *f))},,,,,")
+            for t, w, f in zip(held.t_s, held.rate, held.force, strict=True)]  # fmt: skip
+    field_s, fix_s = np.arange(0.003, 10.0, 0.015), np.arange(0.507, 10.0, 0.2)
+    rows += [(t, f"{t:.12g},,,,,,,20,1,{40 + 0.001 * k:.12g},,") for k, t in enumerate(field_s)]
+    rows += [(t, f"{t:.12g},,,,,,,,,,{t:.12g},-3") for t in fix_s]
+    log = write([header, *(row for _, row in sorted(rows))])
+    np.testing.assert_allclose(log.rows["t_s"], held.t_s, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(log.rows["gyro_b_rad_s"], held.rate, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(np.flatnonzero(log.rows["gps_new"]), np.searchsorted(held.t_s, fix_s))
+    assert log.rows["mag_new"].sum() == len(np.unique(np.searchsorted(held.t_s, field_s)))
+    books = {stream: (e.read, e.used, e.agrees) for stream, e in log.ledger.items()}
+    assert books["gps"] == (len(fix_s), len(fix_s), True)
+    assert books["magnetometer"] == (len(field_s), log.rows["mag_new"].sum(), True)
+    assert books["imu"] == (held.n, held.n, True)
+    assert log.repairs == ()
+
+
+def test_accelerometer_in_rows_of_its_own_is_interpolated(held, write):
+    """Halfway between those of the gyro: a straight line is within g (1.3 rad/s)^2 (0.02 s)^2 / 8 < 1e-3 m/s^2."""
+    between = 0.5 * (held.force[1:] + held.force[:-1])
+    rows = [(t, f"{t:.12g},{','.join(f'{v:.12g}' for v in w)},,,") for t, w in zip(held.t_s, held.rate, strict=True)]
+    rows += [(t, f"{t:.12g},,,,{','.join(f'{v:.12g}' for v in f)}")
+             for t, f in zip(held.t_s[:-1] + 0.01, between, strict=True)]  # fmt: skip
+    log = write(["t,gx,gy,gz,ax,ay,az", *(row for _, row in sorted(rows))])
+    np.testing.assert_allclose(log.rows["t_s"], held.t_s[1:-1], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(log.rows["force_b_m_s2"], held.force[1:-1], rtol=0, atol=2e-3)
+    assert log.repairs[0] == "accelerometer in 499 rows of its own: interpolated to the rows of the gyro"
+    assert (log.ledger["imu"].read, log.ledger["imu"].used) == (held.n, held.n - 2)
+
+
+def test_rows_without_times_are_timed_by_their_intervals(held, write):
+    """The sum of the intervals is the time."""
+    columns = {"dt" if name == "t" else name: values for name, values in held.columns().items()}
+    log = write(held.lines(columns | {"dt": np.full(held.n, 0.02)}))
+    np.testing.assert_allclose(log.rows["t_s"], held.t_s, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(log.rows["dt_s"], 0.02)
+
+
+def test_first_column_without_a_name_is_passed_over(held, write):
+    """As pandas writes its index."""
+    lines = held.lines(held.columns())
+    found = write([f",{lines[0]}", *(f"{k},{line}" for k, line in enumerate(lines[1:]))])
+    assert found.rows.tobytes() == write(lines).rows.tobytes()
+
+
+def test_row_in_which_the_inertial_unit_was_silent_is_left_out_and_counted(held, write):
+    """All six cells empty while the held columns go on: a sample that was lost, not another instrument's row."""
+    lines = held.lines(held.columns())
+    cells = lines[41].split(",")
+    lines[41] = ",".join((cells[0], *[""] * 6, *cells[7:]))
+    log = write(lines)
+    assert log.repairs[0] == "column gx (gyro.x): 1 without a number left out, first line 42"
+    assert log.ledger["imu"].left_out == {"without a number": 1}

@@ -22,15 +22,19 @@ NO_FIX = "no fix of three dimensions"
 NO_VELOCITY = "without a velocity"
 
 
-def inertial(ledger: Ledger, t_s: Array, numbers: Array, keep: NDArray[np.intp]) -> None:
+def inertial(
+    ledger: Ledger, t_s: Array, numbers: Array, keep: NDArray[np.intp], read: NDArray[np.intp] | None = None
+) -> None:
     """Account for the rows of an inertial unit of which those with the indices `keep` are used.
 
     t_s : shape (N,), as read        numbers : shape (N, 6), gyro and accelerometer
+    read : indices of its rows, all of them by default
     """
     n = len(t_s)
-    left = np.ones(n, np.bool_)
+    left = np.zeros(n, np.bool_)
+    left[np.arange(n) if read is None else read] = True
+    ledger.read("imu", int(left.sum()))
     left[keep] = False
-    ledger.read("imu", n)
     ledger.use("imu", len(keep))
     for reason, why in (
         (NO_TIME, ~np.isfinite(t_s)),

@@ -91,6 +91,9 @@ def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Array]]:
             columns = {f: v.astype(np.float64) for f, v in fields.items() if v.ndim == 1 and v.dtype.kind in "fiub"}
             if columns:
                 tables[name] = columns
+            else:  # a structure of messages
+                tables |= {n: t for n, t in _tables({f: v.item() for f, v in fields.items() if v.size == 1} | {
+                    f: v for f, v in fields.items() if v.size != 1}).items() if n not in tables}  # fmt: skip
     return tables
 
 

@@ -27,6 +27,7 @@ from scenarios.harness.logs.units import COUNTS
 from scenarios.harness.logs.validity import usable
 
 Table = dict[str, Array]
+FEWEST_FORCES = 5  # samples of the gyro for one of the accelerometer, at most
 REMEDY = (
     "where the axes are forward, left, up: --columns forward-left-up; right, forward, up: --columns right-forward-up; "
     "where the accelerometer reads gravity minus acceleration: --columns force-reversed; in a map of your own "
@@ -113,6 +114,9 @@ def _with_times(parts: Mapping[tuple[str, int], Group], source: checks.Source) -
         if n not in lengths and part.has("gps.time"):  # the one clock that these columns have
             part.table["time"] = part.table.pop("gps.time")
             part.told |= {"time"} & {q.replace("gps.time", "time") for q in part.told}
+        if n not in lengths and part.has("interval", "gyro.x"):  # a log that times its rows by their lengths
+            part.table["time"] = np.cumsum(np.nan_to_num(part.table["interval"]))
+            part.told |= {"time"}
     groups = {key: part for key, part in parts.items() if part.has("time")}
     for key, part in parts.items():
         if key in groups:
@@ -170,15 +174,19 @@ def recorded(
     groups, source = take(columns, meanings, source, of)
     main = _main(groups, replace(source, offered=source.offered or tuple(columns)))
     repairs: list[str] = []
+    others = _meet(main, repairs) | _of_others(main)
     factor = checks.clock_factor(main.table["time"], source, repairs)
     for group in groups:
         for name in ("time", "interval", "gps.time"):
             if name in group.table and (group is main or name not in group.told):
                 group.table[name] = factor * group.table[name]
     t_s, numbers = main.table["time"], np.column_stack([main.table[name] for name in INERTIAL])
-    keep = _kept(t_s, numbers, source, repairs)
+    inertial = np.flatnonzero(~others)
+    named = {name: numbers[inertial, i] for i, name in enumerate(INERTIAL)}
+    of_file = replace(source, row=lambda k: source.row(int(inertial[k])))
+    keep = inertial[checks.kept(t_s[inertial], named, of_file, repairs)]
     made = _Making(np.zeros(len(keep), MEASURED_DTYPE), Ledger(), repairs)
-    accounts.inertial(made.ledger, t_s, numbers, keep)
+    accounts.inertial(made.ledger, t_s, numbers, keep, inertial)
     rows = made.rows
     rows["t_s"], rows["dt_s"] = t_s[keep], _intervals(main, keep, repairs)
     rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(numbers[keep], 2)
@@ -230,6 +238,31 @@ def _counts(offered: tuple[str, ...], missing: str) -> str:
     return ""
 
 
+def _meet(main: Group, repairs: list[str]) -> NDArray[np.bool_]:
+    """Bring the accelerometer to the times of the gyro, where the two stand in rows of their own; which are its."""
+    gyro, force = (np.isfinite([main.table[n] for n in names]).all(axis=0) for names in (INERTIAL[:3], INERTIAL[3:]))
+    if 2 * np.sum(gyro & force) >= np.sum(gyro) or np.sum(force) * FEWEST_FORCES < np.sum(gyro):
+        return np.zeros(main.n, np.bool_)
+    order = np.argsort(main.table["time"], kind="stable")
+    for name in INERTIAL[3:]:
+        found = interpolated(main.table["time"], main.table["time"][order], main.table[name][order])
+        main.table[name] = np.where(gyro, found, np.nan)
+    repairs.append(f"accelerometer in {np.sum(force & ~gyro)} rows of its own: interpolated to the rows of the gyro")
+    return np.asarray(force & ~gyro)
+
+
+def _of_others(main: Group) -> NDArray[np.bool_]:
+    """Rows of other instruments: without an inertial reading, but with one that most inertial rows do not have."""
+    none = ~np.isfinite([main.table[name] for name in INERTIAL]).any(axis=0)
+    others = np.zeros(main.n, np.bool_)
+    if none.any() and not none.all():
+        for name, values in main.table.items():
+            there = np.isfinite(values)
+            if name not in ("time", "interval", *INERTIAL) and 2 * np.sum(there & ~none) < np.sum(~none):
+                others |= none & there
+    return others
+
+
 def interpolated(t_s: Array, times: Array, values: Array) -> Array:
     """Values at other times, NaN outside them and in gaps."""
     known = np.isfinite(times) & np.isfinite(values)
@@ -242,16 +275,6 @@ def interpolated(t_s: Array, times: Array, values: Array) -> Array:
     usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     inside &= times[after] - times[before] <= max(5.0 * usual, 0.0) + 1e-12
     return np.where(inside, np.interp(t_s, times, values), np.nan)
-
-
-def _kept(t_s: Array, numbers: Array, source: checks.Source, repairs: list[str]) -> NDArray[np.intp]:
-    """Rows of the inertial unit, in order of time; rows in which it says nothing at all are those of others."""
-    said = np.flatnonzero(np.isfinite(numbers).any(axis=1))
-    if not len(said):
-        said = np.arange(len(t_s))
-    of_file = replace(source, row=lambda k: source.row(int(said[k])))
-    named = {name: numbers[said, i] for i, name in enumerate(INERTIAL)}
-    return np.asarray(said[checks.kept(t_s[said], named, of_file, repairs)])
 
 
 def _intervals(main: Group, keep: NDArray[np.intp], repairs: list[str]) -> Array:
