@@ -414,19 +414,22 @@ def export(
     ] = None,
     nmea: Annotated[Path | None, typer.Option(metavar="FILE", help="Write NMEA 0183: GGA, RMC and VTG.")] = None,
     ubx: Annotated[Path | None, typer.Option(metavar="FILE", help="Write UBX NAV-PVT.")] = None,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write all of it as a text log, and its column map beside it.")
+    ] = None,
     start: Annotated[
         str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2026-07-02T12:00:00]")
     ] = None,
     json_: JsonOption = None,
 ) -> None:
-    """The GPS fixes of a recording, as the sentences and messages that a receiver sends."""
+    """A recording for other programs: its GPS fixes as messages of a receiver, all of it as a text log."""
     with reporting(json_) as report:
         with usage():
             from scenarios.harness import exporting, viewing
 
-            for path in (nmea, ubx):
+            for path in (nmea, ubx, csv, exporting.map_of(csv) if csv is not None else None):
                 check_file(path)
-            done = exporting.make(flight or viewing.newest(FLIGHTS), nmea, ubx, exporting.parse_start(start))
+            done = exporting.make(flight or viewing.newest(FLIGHTS), nmea, ubx, exporting.parse_start(start), csv)
         for path, data in done.files.values():
             write(path, partial(bytes, data))
         report(done.to_json())

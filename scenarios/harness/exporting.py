@@ -1,5 +1,6 @@
-"""The GPS fixes of a recorded flight as NMEA sentences and UBX messages, for programs that speak those."""
+"""A recorded flight for other programs: its GPS fixes as NMEA sentences and UBX messages, all of it as a text log."""
 
+import gzip
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +8,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from scenarios.harness import console
+from scenarios.harness import console, export_text
 from scenarios.harness.fitted import suite_params
 from sim import gps_messages, recording
 from sim.gps_messages import Accuracy, Fixes
@@ -16,12 +17,16 @@ from sim.log import Flight
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """What is to be written of the recording `flight`: the bytes for each file, by format."""
+    """What is to be written of the recording `flight`: the bytes for each file, by format.
+
+    rows : of its text log
+    """
 
     flight: Path
     fixes: Fixes
     start: datetime
     files: dict[str, tuple[Path, bytes]]
+    rows: int = 0
 
     def utc(self, t_s: float) -> datetime:
         """UTC at `t_s` since power-up."""
@@ -33,6 +38,7 @@ class Export:
         return {
             "flight": str(self.flight),
             "fixes": len(self.fixes),
+            "rows": self.rows,
             "start_utc": self.start.isoformat(),
             "first_t_s": first_t_s,
             "last_t_s": last_t_s,
@@ -53,27 +59,56 @@ def parse_start(text: str | None) -> datetime:
     return start if start.tzinfo is not None else start.replace(tzinfo=gps_messages.START.tzinfo)
 
 
-def make(source: Path, nmea: Path | None, ubx: Path | None, start: datetime) -> Export:
-    """Put the fixes of the recording at `source` (as `view` takes it) into messages.
+def make(
+    source: Path, nmea: Path | None = None, ubx: Path | None = None, start: datetime = gps_messages.START,
+    csv: Path | None = None,
+) -> Export:  # fmt: skip
+    """Put the recording at `source` (as `view` takes it) into messages and a text log.
+
+    nmea, ubx, csv : where each will be written      start : UTC at power-up
+    The text log is packed where its name ends with .gz, and its column map is written beside it, as .toml.
 
     Raises
     ------
-    ValueError      nothing asked for, no recording there, no fix in it, or a package that is missing
+    ValueError      nothing asked for, no recording there, no fix for the messages, or a package that is missing
     """
-    if nmea is None and ubx is None:
-        raise ValueError("nothing to write: name --nmea FILE, --ubx FILE or both")
-    if nmea is not None and ubx is not None and nmea.resolve() == ubx.resolve():
-        raise ValueError(f"--nmea and --ubx both name {nmea}: each needs a file of its own")
+    if nmea is None and ubx is None and csv is None:
+        raise ValueError("nothing to write: name --nmea FILE, --ubx FILE, --csv FILE or several of them")
+    named: dict[Path, str] = {}
+    wanted = {"--nmea": nmea, "--ubx": ubx, "--csv": csv, "the map of --csv": None if csv is None else map_of(csv)}
+    for option, path in wanted.items():
+        if path is None:
+            continue
+        if path.resolve() in named:
+            raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: each needs a file of its own")
+        named[path.resolve()] = option
     flight = recording.load(source.parent if source.suffix == ".rrd" else source)
     fixes = Fixes.from_log(flight.log.measured, accuracy_of(flight))
-    if len(fixes) == 0:
+    if len(fixes) == 0 and (nmea is not None or ubx is not None):
         raise ValueError(f"no GPS fix arrived in {source}: nothing to export")
     encoders: dict[str, tuple[Path | None, Callable[..., bytes]]] = {
         "NMEA": (nmea, gps_messages.encode_nmea),
         "UBX": (ubx, gps_messages.encode_ubx),
     }
     files = {name: (path, encode(fixes, start=start)) for name, (path, encode) in encoders.items() if path is not None}
-    return Export(source, fixes, start, files)
+    if csv is not None:
+        columns = export_text.columns(flight)
+        text = export_text.to_csv(columns).encode()
+        files["CSV"] = csv, gzip.compress(text, mtime=0) if csv.suffix == ".gz" else text
+        files["map"] = map_of(csv), export_text.to_map(columns, flight, csv.name).encode()
+    return Export(source, fixes, start, files, len(flight.log))
+
+
+def map_of(csv: Path) -> Path:
+    """Where the column map of a text log is written: beside it, as .toml.
+
+    Raises
+    ------
+    ValueError      a name that `replay` would not read as a text log
+    """
+    if not csv.name.lower().endswith((".csv", ".csv.gz")):
+        raise ValueError(f"--csv {csv}: name a file that ends with .csv or .csv.gz")
+    return csv.with_name(csv.name[: csv.name.lower().rindex(".csv")] + ".toml")
 
 
 def accuracy_of(flight: Flight) -> Accuracy:
@@ -93,10 +128,13 @@ def tell(export: Export) -> None:
 
     first_t_s, last_t_s = _span(export.fixes)
     times = ["none" if t is None else f"{export.utc(t):%H:%M:%S.%f}"[:-3] for t in (first_t_s, last_t_s)]
-    fixes = str(len(export.fixes))
-    rows = [(name, fixes, *times, str(len(data)), escape(str(path))) for name, (path, data) in export.files.items()]
-    headings = ("", "fixes", "first, UTC", "last, UTC", "bytes", "file")
-    title = f"GPS fixes of {export.utc(first_t_s or 0.0):%Y-%m-%d}"
+    rows = []
+    for name, (path, data) in export.files.items():
+        of_fixes = name in ("NMEA", "UBX")
+        held = str(len(export.fixes)) if of_fixes else str(export.rows) if name == "CSV" else ""
+        rows.append((name, held, *(times if of_fixes else ("", "")), str(len(data)), escape(str(path))))
+    headings = ("", "fixes, rows", "first, UTC", "last, UTC", "bytes", "file")
+    title = f"GPS fixes of {export.utc(first_t_s or 0.0):%Y-%m-%d}" if "CSV" not in export.files else "exported"
     console.out().print(console.table(title, headings, rows, text=(0, 5)))
 
 

@@ -29,7 +29,7 @@ NOT_RUN = {
     r"git clone .*": "needs the network",
     r"make (fly|venv|lint|test)": "installs from the network; make test is what runs this",
     r"wingslevel view": "opens a window; refused without a display, see test_view_command_of_the_readme",
-    r"wingslevel export .*": "needs a flight, see test_export_command_of_the_readme",
+    r"wingslevel export .*": "needs a flight, see test_export_commands_of_the_documents",
     r"wingslevel fly hand_launch --live": "opens a window",
     r"wingslevel claims": "minutes of flights; the next line of the README measures one",
     r"wingslevel claims --markdown docs/claims.md": "the same; tests/unit/test_claims.py compares the page",
@@ -89,12 +89,14 @@ def test_view_command_of_the_readme_is_understood(here: Path, capsys, monkeypatc
     assert (here / "flights" / "hand_launch-premerlani-seed0" / "flight.parquet").is_file()
 
 
-def test_export_command_of_the_readme_writes_what_it_names(here: Path) -> None:
-    """It takes the newest flight."""
-    (command,) = (c for c in commands() if c.startswith("wingslevel export"))
+def test_export_commands_of_the_documents_write_what_they_name(here: Path) -> None:
+    """They take the newest flight, or the one that they name; a text log replays with its map."""
     run(["fly", "hand_launch", "--duration", "2", "--no-rerun"])
-    assert run(shlex.split(command)[1:]) == 0
-    assert {"fixes.nmea", "fixes.ubx"} <= {path.name for path in here.iterdir()}
+    for command in (c for c in commands() if c.startswith("wingslevel export")):
+        assert run(shlex.split(command)[1:]) == 0
+    assert {"fixes.nmea", "fixes.ubx", "flight.csv", "flight.toml"} <= {path.name for path in here.iterdir()}
+    (replay,) = (c for c in commands() if c.startswith("wingslevel replay flight.csv --columns flight.toml"))
+    assert run([*shlex.split(replay)[1:], "--no-rerun"]) == 0
 
 
 @pytest.mark.usefixtures("here")

@@ -99,11 +99,12 @@ def test_log_knows_its_receiver_and_how_the_original_was_set():
     """By the names of the files; the input is rounded as the original of 2013 got it, and for that alone."""
     folder = DATA / "ap_ahrs_dcm"
     truth = reference.read(folder / "C50_in.csv.gz")
-    of_truth = {name: known.value for name, known in truth.known.items()}
-    assert of_truth == {"declination_rad": np.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.4}
+    of_set = {"declination_rad": np.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.4}
+    measured = {"imu_rate_hz": 50.0, "gps_rate_hz": 5.0, "gps_stamped": False, "gps_vertical_velocity": True}
+    assert {name: known.value for name, known in truth.known.items()} == of_set | measured
     original = reference.read(folder / "C50_in.csv.gz", folder / "C50_ap2013_gps.csv.gz")
-    of_original = {name: known.value for name, known in original.known.items()}
-    assert of_original == {**of_truth, "quirks": "JULY_2013", "use_magnetometer": False}
+    as_set = {"quirks": "JULY_2013", "use_magnetometer": False}
+    assert {name: known.value for name, known in original.known.items()} == of_set | measured | as_set
     cm_s = 100.0 * original.rows["gps_v_e_m_s"]
     np.testing.assert_allclose(cm_s, np.rint(cm_s), rtol=0, atol=1e-9)
     assert not np.allclose(100.0 * truth.rows["gps_v_e_m_s"], np.rint(cm_s), rtol=0, atol=0.1)

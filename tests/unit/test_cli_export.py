@@ -92,7 +92,7 @@ def test_export_twice_replaces_with_the_same_bytes(here: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["export"], "name --nmea FILE, --ubx FILE or both"),
+        (["export"], "name --nmea FILE, --ubx FILE, --csv FILE or several"),
         (["export", "--nmea", "a", "--ubx", "./a"], "each needs a file of its own"),
         (["export", "nowhere", "--nmea", "a"], "no recording at"),
         (["export", "--nmea", "a", "--start", "monday"], "--start 'monday'"),

@@ -1,11 +1,16 @@
-"""Column maps: units, signs and names, spelled in TOML or recognised."""
+"""Column maps: units, signs, scales, axes and what is known of the instruments, spelled in TOML."""
 
 import numpy as np
 import pytest
 
-from scenarios.harness.logs import column_map
-from scenarios.harness.logs.column_map import MAPS, QUANTITIES, automatic, load
+from estimator.instruments import Known
+from scenarios.harness.logs import tabular
+from scenarios.harness.logs.checks import Source
+from scenarios.harness.logs.column_map import MAPS, ColumnMap, load
+from scenarios.harness.logs.quantities import INERTIAL
 from scenarios.harness.logs.recorded import LogError
+
+DEG, KNOT = np.pi / 180.0, 1852.0 / 3600.0
 
 
 def written(tmp_path, text):
@@ -28,16 +33,112 @@ def test_load_reads_sign_quantity_and_unit(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("entry", "factor"),
+    [
+        ("gyro.x °/s", DEG), ("gyro.x deg/sec", DEG), ("gyro.x Degrees per second", DEG), ("gyro.x DPS", DEG),
+        ("gyro.x rad/sec", 1.0), ("gyro.x deg/h", DEG / 3600.0), ("gyro.x rpm", 2.0 * np.pi / 60.0),
+        ("force.x m/s²", 1.0), ("force.x m/s/s", 1.0), ("force.x M/S^2", 1.0), ("force.x G", 9.80665),
+        ("force.x mG", 9.80665e-3), ("force.x ft/s^2", 0.3048),
+        ("mag.x µT", 1.0), ("mag.x μT", 1.0), ("mag.x microtesla", 1.0), ("mag.x nT", 1e-3), ("mag.x Gauss", 100.0),
+        ("mag.x G", 100.0), ("mag.x mG", 0.1), ("mag.x milligauss", 0.1),
+        ("gps.vn kn", KNOT), ("gps.vn kt", KNOT), ("gps.vn kts", KNOT), ("gps.vn knots", KNOT), ("gps.vn ft/s", 0.3048),
+        ("gps.vn mph", 0.44704), ("gps.vn km/h", 1.0 / 3.6), ("gps.vn mm/s", 1e-3), ("airspeed knot", KNOT),
+        ("height ft", 0.3048), ("gps.altitude feet", 0.3048), ("gps.latitude 1e-7deg", 1e-7 * DEG),
+        ("time milliseconds", 1e-3), ("time usec", 1e-6), ("time ns", 1e-9), ("yaw degrees", DEG),
+    ],
+)  # fmt: skip
+def test_load_understands_spellings_of_a_unit(tmp_path, entry, factor):
+    """In any case, with the usual words and signs; by the definitions of the units."""
+    found = load(written(tmp_path, f'[columns]\na = "{entry}"')).columns["a"]
+    assert found.factor == pytest.approx(factor, rel=1e-12)
+    assert found.told
+
+
+def test_load_scale_is_factor_times_number_less_offset(tmp_path):
+    """A sensor in counts: 512 is zero, one count 0.0305 deg/s, and the axis counts the other way."""
+    text = '[columns]\nt = "time"\nw = { is = "-gyro.x", unit = "deg/s", factor = 0.0305, offset = 512 }'
+    meanings = load(written(tmp_path, text))
+    columns = {"t": np.array([0.0, 1.0]), "w": np.array([512.0, 712.0])}
+    (group,), _ = tabular.take(columns, meanings, Source(tmp_path))
+    np.testing.assert_allclose(group.table["gyro.x"], [0.0, -6.1 * DEG], rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("axes", "forward", "right", "down"),
+    [
+        ("forward-left-up", 0, -1, -2), ("right-forward-up", 1, 0, -2), ("FRD", 0, 1, 2), ("back, right, up", 0, 1, -2),
+        ("left-back-up", -1, 0, -2),
+    ],
+)  # fmt: skip
+def test_load_axes_turn_gyro_force_and_field_together(tmp_path, axes, forward, right, down):
+    """Each axis of the body is one of the sensor, or its negative: those that the names say."""
+    signs = {"back, right, up": (-1, 1, -1), "left-back-up": (-1, -1, -1)}.get(axes)
+    meanings = load(written(tmp_path, f'axes = "{axes}"\n'))
+    numbers = np.array([1.0, 2.0, 3.0])
+    table = {f"{v}.{a}": np.array([n]) for v in ("gyro", "force", "mag") for a, n in zip("xyz", numbers, strict=True)}
+    group = tabular.Group(table)
+    tabular.turn(group, meanings)
+    wanted = [numbers[abs(i)] * (1 if i >= 0 else -1) for i in (forward, right, down)]
+    if signs is not None:
+        wanted = [s * numbers[abs(i)] for s, i in zip(signs, (forward, right, down), strict=True)]
+    if axes == "left-back-up":  # forward is minus y, right is minus x
+        wanted = [-2.0, -1.0, -3.0]
+    for vector in ("gyro", "force", "mag"):
+        assert [float(group.table[f"{vector}.{a}"][0]) for a in "xyz"] == wanted
+
+
+def test_load_reads_the_form_of_a_file_and_what_its_attitude_is(tmp_path):
+    """Decimal sign, names for a file without a header, kind of the reference, origin; no table of columns is needed."""
+    text = 'decimal = ","\nnames = ["t", "gx"]\nreference = "truth"\norigin_deg = [47, 8.5]\nforce_reversed = true'
+    found = load(written(tmp_path, text))
+    assert (found.decimal, found.names, found.reference) == (",", ("t", "gx"), "truth")
+    assert (found.origin_deg, found.force_reversed, found.columns) == ((47.0, 8.5), True, {})
+
+
+@pytest.mark.parametrize("table", ["instruments", "suits"])
+def test_load_instruments_are_properties_or_parameters_of_an_estimator(tmp_path, table):
+    """Numbers and truth values; `use_compass` is a parameter of ap_dcm alone; [suits] is the older name."""
+    text = f"[{table}]\ngps_latency_s = 0.2\ngps_stamped = true\nuse_compass = 0\n"
+    known = load(written(tmp_path, text)).known
+    assert known == {
+        "gps_latency_s": Known(0.2, "log", "own.toml"),
+        "gps_stamped": Known(True, "log", "own.toml"),
+        "use_compass": Known(0, "log", "own.toml"),
+    }
+
+
+@pytest.mark.parametrize(
     ("text", "said"),
     [
         ("[columns", "own.toml"),
         ("other = 1\n[columns]", "unknown entry 'other'"),
-        ("", r"no table \[columns\]"),
+        ('colums = "a"', "unknown entry 'colums': did you mean columns"),
+        ("", "empty; a map has a table"),
+        ("columns = 3", "columns must be a table"),
         ('[columns]\na = "gyro.w"', "a = 'gyro.w': unknown quantity 'gyro.w': did you mean"),
         ('[columns]\na = "gyro.x uT"', "unit 'uT' of gyro.x must be one of rad/s, deg/s"),
-        ('[columns]\na = "gyro.x"\nb = "gyro.x"', "gyro.x is the meaning of two columns"),
-        ('[columns]\n[suits]\na = "b"', r"\[suits\] must hold numbers"),
-        ('delimiter = ",,"\n[columns]', "delimiter must be one character"),
+        ('[columns]\na = "gyro.x counts"', r"counts is no unit: say what one of them is.*factor = 0\.001"),
+        ('[columns]\na = "gyro.x"\nb = "gyro.x"', "gyro.x is the meaning of two columns, a and b"),
+        ('[columns]\na = { is = "gyro.x", unit = "deg/s", facter = 2 }', "unknown entry 'facter': did you mean factor"),
+        ('[columns]\na = { is = "gyro.x", factor = 0 }', "factor = 0 would make every value zero"),
+        ('[columns]\na = { is = "gyro.x", offset = "b" }', "offset = 'b' must be a number"),
+        ('[columns]\na = { unit = "deg/s" }', r"write \{ is = "),
+        ('[columns]\n[suits]\ngps_latency_s = "b"', r"\[suits\] gps_latency_s = 'b' must be a number, true or false"),
+        ("[instruments]\ngps_lateny_s = 1", r"gps_lateny_s: no such property: did you mean gps_latency_s"),
+        ("[instruments]\nuse_compas = 1", r"use_compas: no such property: did you mean use_compass"),
+        ("[instruments]\ngps_latency_s = inf", "gps_latency_s = inf must be a number"),
+        ('delimiter = ",,"\n[columns]', "delimiter = ',,' must be one character"),
+        ('decimal = ";"', "decimal = ';' must be"),
+        ("skip_lines = -1", "skip_lines = -1 must be a whole number"),
+        ("names = 3", "names must be a list"),
+        ('axes = "forward-left-down"', "left-handed"),
+        ('axes = "forward-back-up"', "say where x, y and z point"),
+        ('axes = "north-east-down"', "say where x, y and z point"),
+        ('force_reversed = "yes"', "must be true or false"),
+        ('reference = "gold"', "reference = 'gold' must be truth, filter or firmware"),
+        ('withheld = ["gps_rate"]', "withheld 'gps_rate': did you mean gps_rate_hz"),
+        ('withheld = ["gps_rate_hz"]\n[instruments]\ngps_rate_hz = 4', "withheld 'gps_rate_hz': it has a value too"),
+        ("origin_deg = [100, 0]", "must be a latitude and a longitude"),
     ],
 )
 def test_load_bad_map_is_refused_in_one_line(tmp_path, text, said):
@@ -55,46 +156,15 @@ def test_load_unknown_map_names_those_there_are():
 
 @pytest.mark.parametrize("path", sorted(MAPS.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_shipped_map_has_what_a_replay_needs(path):
-    """Time, gyro and accelerometer, each with its unit said."""
-    columns = load(path.stem).columns
-    assert {"time", *column_map.INERTIAL} <= {m.quantity for m in columns.values()}
-    assert all(m.told for m in columns.values())
+    """Time, gyro and accelerometer, each with its unit said; or axes for columns that are recognised."""
+    found = load(path.stem)
+    if not found.columns:
+        assert found.R_bs is not None or found.force_reversed
+        return
+    assert {"time", *INERTIAL} <= {m.quantity for m in found.columns.values()}
+    assert all(m.told for m in found.columns.values())
 
 
-@pytest.mark.parametrize(
-    ("column", "quantity", "factor"),
-    [
-        ("gx", "gyro.x", 1.0),
-        ("gyro_y_deg_s", "gyro.y", np.pi / 180),
-        ("GyrZ [dps]", "gyro.z", np.pi / 180),
-        ("measured.gyro_b_rad_s.z", "gyro.z", 1.0),
-        ("acc_x (g)", "force.x", 9.80665),
-        ("accel_z_m_s2", "force.z", 1.0),
-        ("mag_x_uT", "mag.x", 1.0),
-        ("time_ms", "time", 1e-3),
-        ("timestamp_us", "time", 1e-6),
-        ("measured.gps_v_e_m_s.e", "gps.ve", 1.0),
-        ("measured.gps_p_e_m.d", "gps.d", 1.0),
-        ("truth.R_eb.zx", "r20", 1.0),
-        ("roll_deg", "roll", np.pi / 180),
-        ("Airspeed", "airspeed", 1.0),
-    ],
-)
-def test_automatic_knows_names_in_use(column, quantity, factor):
-    """Our own Parquet's names, those of other people's logs, a unit behind the name or in brackets."""
-    meaning = automatic([column]).columns[column]
-    assert meaning.quantity == quantity
-    assert meaning.factor == pytest.approx(factor, rel=1e-15)
-
-
-def test_automatic_takes_no_estimate_for_a_measurement_and_the_first_of_two():
-    """What an autopilot believed is not what a sensor said; a second column of one meaning is left alone."""
-    found = automatic(["flown.R_eb.xx", "truth.airspeed_m_s", "gx", "gyro_x", "mode", "airspeed"])
-    assert {name: m.quantity for name, m in found.columns.items()} == {"gx": "gyro.x", "airspeed": "airspeed"}
-
-
-def test_automatic_name_of_every_quantity_is_its_own():
-    """Our own names, with a dot or an underscore, are understood for every quantity."""
-    for name in QUANTITIES:
-        for spelled in (name, name.replace(".", "_")):
-            assert automatic([spelled]).columns[spelled].quantity == name
+def test_map_without_columns_recognises_them():
+    """As without a map."""
+    assert ColumnMap().of(["gx", "mode"]).columns["gx"].quantity == "gyro.x"

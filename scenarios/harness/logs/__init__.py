@@ -7,9 +7,9 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-from scenarios.harness.logs import checks, column_map, foreign
+from scenarios.harness.logs import accounts, checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
-from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.recorded import LogError, RecordedLog
 
 _BY_MAP = {  # columns of numbers, which a column map explains
     **dict.fromkeys((".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz"), "text"),
@@ -30,7 +30,7 @@ def read(
     Parameters
     ----------
     reference : attitudes to score against, in a file of their own; for reference vectors one of the same set, for
-                others a text file with times on the same clock
+                others any log with an attitude, or a table of times on the same clock and attitudes
     columns : column map of a text or MATLAB file, see `column_map`
     imu : which inertial unit of an autopilot's log, from 0; by default the first one
 
@@ -43,14 +43,28 @@ def read(
     if columns is None and vectors.is_reference(path):
         return checks.mended(vectors.read(path, reference), path)
     log = _read(path, None if columns is None else column_map.load(columns), imu)
-    if reference is not None:
-        from scenarios.harness.logs import tabular, text
+    return log if reference is None else _against(log, reference)
 
-        if not reference.is_file():
-            raise LogError(f"no reference at {reference}: there is no such file")
-        R_eb = tabular.at_times(*text.attitudes(reference), log.rows["t_s"])
-        log = replace(log, reference=Reference(R_eb, "filter", reference.name))
-    return log
+
+def _against(log: RecordedLog, path: Path) -> RecordedLog:
+    """`log` with the attitudes of the file at `path` at the times of its rows."""
+    from scenarios.harness.logs import reference_file
+
+    if not path.exists():
+        raise LogError(f"no reference at {path}: there is no such file")
+    rows_s, ledger, repairs = log.rows["t_s"], accounts.without(log.ledger, "reference"), list(log.repairs)
+    reader = _module(path.name.lower(), _BY_MAP)
+    kind: reference_file.Kind = "filter"
+    if reader and not vectors.is_reference(path):
+        groups, source, notes = import_module(f"{__name__}.{reader}").groups(path)
+        repairs += [f"{path.name}: {line}" for line in notes]
+        R_eb = reference_file.of_table(path, groups, source, rows_s, ledger, repairs)
+    else:
+        other = read(path)
+        repairs += [f"{path.name}: {line}" for line in other.repairs]
+        R_eb, kind = reference_file.of_log(path, other, rows_s, ledger)
+    found = reference_file.reference(R_eb, kind, path)
+    return replace(log, reference=found, ledger=ledger, repairs=tuple(repairs))
 
 
 def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) -> RecordedLog:

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from estimator.interface import Array
 from estimator.screening import G_M_S2, GYRO_RANGE_RAD_S, LONGEST_GAP_S
-from scenarios.harness.logs import gaps
+from scenarios.harness.logs import accounts, gaps
+from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED, ZEROS
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.witnesses import witnesses
@@ -29,22 +30,28 @@ FASTEST_HZ = 20_000.0
 BUSIEST_RAD_S = 3.0  # no aeroplane turns faster for half of a log
 FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
+_PERIODS = (2.0**16, 86400.0, 604800.0, 86400.0e3, 604800.0e3, 2.0**32)  # of counters, days and weeks in s and ms
 _DEGREES = 180.0 / np.pi
-NO_NUMBER, AGAIN, ZEROS = "without a number", "time repeated", "zeros before the first reading"  # for the ledger
 _ARRIVALS = (
     ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s"), "gps"),
     ("mag_new", "magnetic samples", ("mag_b_ut",), "magnetometer"),
-    ("air_new", "air-data samples", ("airspeed_m_s",), "airspeed"),
+    ("air_new", "air-data samples", ("airspeed_m_s", "baro_height_m"), "airspeed"),
 )
+_EITHER = "air_new"  # arrives where one of its numbers is there: not every aeroplane has a pitot tube
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """How a log's own words name a place in it: its file, its names of our quantities, its number of a row."""
+    """How a log's own words name a place in it: its file, its names of our quantities, its number of a row.
+
+    remedy : what to do where the specific force is the wrong way round      offered : names of all columns it has
+    """
 
     path: Path
     columns: Mapping[str, str] = field(default_factory=dict)
     row: Callable[[int], str] = lambda k: f"row {k + 1}"
+    offered: tuple[str, ...] = ()
+    remedy: str = "its axes point up, or it reads gravity minus acceleration"
 
     def column(self, quantity: str) -> str:
         """The file's own name of `quantity`."""
@@ -67,6 +74,24 @@ def clock_factor(t_s: Array, source: Source, repairs: list[str]) -> float:
             repairs.append(f"{source.column('time')} in {name}, not seconds: converted")
             return factor
     return 1.0
+
+
+def unwrapped(ticks: Array) -> Array:
+    """Times of a counter that begins anew at a power of two, at the end of a day or of a week: continued.
+
+    ticks : shape (N,), in the unit of the file
+    """
+    good = np.flatnonzero(np.isfinite(ticks))
+    if len(good) < 2:
+        return ticks
+    before, after, largest = ticks[good[:-1]], ticks[good[1:]], float(ticks[good].max())
+    for period in _PERIODS:
+        back = (before > 0.99 * period) & (after < 0.01 * period)
+        if largest <= period and back.any():
+            turns = np.zeros(len(ticks))
+            turns[good[1:][back]] = period
+            return np.asarray(ticks + np.cumsum(turns))
+    return ticks
 
 
 def kept(
@@ -120,13 +145,15 @@ def kept(
     if len(again):
         first_row = source.row(int(keep[again[0]]))
         repairs.append(f"{source.column('time')}: {len(again)} repeated, left out; first {first_row}")
-        ledger.leave_out("imu", len(again), AGAIN)
+        ledger.leave_out("imu", len(again), REPEATED)
         keep = np.delete(keep, again)
     return keep
 
 
 def mended(log: RecordedLog, path: Path) -> RecordedLog:
     """`log` as some reader gave it, with its rows put in order, and judged; see the module.
+
+    What becomes of its rows and of what arrived in them is entered in its ledger, beside what its reader left out.
 
     Raises
     ------
@@ -137,20 +164,27 @@ def mended(log: RecordedLog, path: Path) -> RecordedLog:
     vectors = {"gyro": rows["gyro_b_rad_s"], "force": rows["force_b_m_s2"]}
     numbers = {f"{name}.{axis}": v[:, i] for name, v in vectors.items() for i, axis in enumerate("xyz")}
     keep = kept(rows["t_s"], numbers, source, repairs)
+    accounts.inertial(log.ledger, rows["t_s"], np.column_stack(list(numbers.values())), keep)
     if len(keep) < len(rows) or np.any(np.diff(keep) != 1):
         moved = rows[keep]
-        in_order = np.all(np.diff(keep) > 0)
-        for name, *_ in _ARRIVALS if in_order else ():  # what arrived with a row left out arrives with the next
-            so_far = np.concatenate(([0], np.cumsum(rows[name])))[keep + 1]
-            moved[name] = np.diff(so_far, prepend=0) > 0
+        for name, *_ in _ARRIVALS:  # what arrived with a row left out arrives with the next
+            at = np.searchsorted(moved["t_s"], rows["t_s"][rows[name] > 0])
+            moved[name] = 0
+            moved[name][at[at < len(moved)]] = 1
         rows = moved
         if reference is not None:
             reference = replace(reference, R_eb=reference.R_eb[keep])
-    return judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
+    found = judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
+    accounts.arrivals(log.ledger, log.rows, found.rows)
+    if log.reference is not None and reference is not None:
+        accounts.reference(log.ledger, log.reference.known, int(reference.known.sum()))
+    return found
 
 
-def judged(log: RecordedLog, source: Source) -> RecordedLog:
-    """`log`, whose rows are in order, with intervals where it has none and units as they must be; its gaps told.
+def judged(log: RecordedLog, source: Source, ledger: Ledger | None = None) -> RecordedLog:
+    """`log`, whose rows are in order, with intervals where it has none and units as they must be; gaps are reported.
+
+    ledger : where samples that arrived without a number are counted, by default nowhere
 
     Raises
     ------
@@ -158,7 +192,7 @@ def judged(log: RecordedLog, source: Source) -> RecordedLog:
     """
     rows, repairs = log.rows.copy(), list(log.repairs)
     _fill_intervals(rows, source, repairs)
-    _check_arrivals(rows, repairs, log.ledger)
+    _check_arrivals(rows, repairs, Ledger() if ledger is None else ledger)
     _check_force(rows, source, repairs)
     factor = rate_factor(rows, log.reference)
     if factor != 1.0:
@@ -198,7 +232,8 @@ def _check_arrivals(rows: NDArray[Any], repairs: list[str], ledger: Ledger) -> N
     """What arrived without a number in it did not arrive."""
     for new, what, columns, stream in _ARRIVALS:
         broken = rows[new] > 0
-        broken &= ~np.all([np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns], axis=0)
+        there = [np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns]
+        broken &= ~(np.any if new == _EITHER else np.all)(there, axis=0)
         if broken.any():
             repairs.append(f"{broken.sum()} {what} without a number left out, first {_at(rows, broken)}")
             if stream in ledger:
@@ -217,13 +252,12 @@ def _check_force(rows: NDArray[Any], source: Source, repairs: list[str]) -> None
         repairs.append(f"{source.column('force')} in g, not m/s^2: converted")
         rows["force_b_m_s2"] *= G_M_S2
     elif not 0.5 * G_M_S2 < length < 2.5 * G_M_S2:
-        raise source.refusal(None, "force", f"{length:g} m/s^2 is its median; an aeroplane feels about {G_M_S2:.1f}")
+        counts = "; counts need a factor in a column map" if length > 100.0 * G_M_S2 else ""
+        why = f"{length:g} m/s^2 is its median; an aeroplane feels about {G_M_S2:.1f}{counts}"
+        raise source.refusal(None, "force", why)
     z = float(np.median(rows["force_b_m_s2"][:, 2]))
     if z > 0.5 * G_M_S2:
-        why = (
-            f"{z:.1f} m/s^2 is the median of z; specific force is {-G_M_S2:.1f} when level: give the force a minus "
-            "sign in the map, or, where the axes are forward, left, up, y and z of gyro and force"
-        )
+        why = f"{z:.1f} m/s^2 is the median of z; specific force is {-G_M_S2:.1f} when level: {source.remedy}"
         raise source.refusal(None, "force", why)
 
 

@@ -1,120 +1,94 @@
 """What the columns of a table mean: our names for them, their units and signs.
 
 A map is a TOML file.  Its table ``[columns]`` gives each column that is used one of `QUANTITIES`, with a minus sign
-where the column counts the other way, and a unit where it is not SI::
+where the column counts the other way, and a unit where it is not ours; or a table of these and a linear scale, where
+value = factor * (number in the file - offset), in that unit::
 
-    delimiter = ";"         # of a text file; a comma unless told
-    skip_lines = 2          # of a text file, before its header
-    struct = "flight_data"  # of a MATLAB file: the structure that holds the columns
+    delimiter = ";"           # of a text file; found unless given.  " " is any number of blanks and tabs
+    decimal = ","             # of its numbers
+    skip_lines = 2            # before its header
+    names = ["t", "wx"]       # of its columns, where it has no header
+    struct = "flight_data"    # of a MATLAB file: the structure that holds the columns
+    axes = "forward-left-up"  # of the inertial unit and the magnetometer; forward-right-down unless given
+    force_reversed = true     # the accelerometer reads gravity minus acceleration
+    reference = "truth"       # what the attitude in the file is: truth, filter or firmware
 
     [columns]
     time_ms = "time ms"
     wx = "gyro.x deg/s"
     az = "-force.z g"
+    raw_x = { is = "mag.x", unit = "mG", factor = 0.92, offset = 12 }
 
     [instruments]  # what is known of them, by the names of `estimator.instruments.PROPERTIES`
     gps_latency_s = 0.2
 
-Without a map, columns are known by the names in use (`automatic`), a unit at the end of a name included:
-``gyro_x_deg_s``, ``acc_z [g]``.
+``withheld = ["gps_rate_hz"]`` names properties that estimators do not receive although the log shows them.  Without a
+table ``[columns]`` the columns are recognised by their names, as they are without a map (`automatic`).
 """
 
-import re
+import math
 import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, Literal, cast
 
 import numpy as np
 
-from estimator.instruments import Known
-from estimator.screening import G_M_S2
+from estimator.instruments import PROPERTIES, Known
+from estimator.interface import Array
+from scenarios.harness.logs import column_names, units
+from scenarios.harness.logs.quantities import QUANTITIES, Meaning
 from scenarios.harness.logs.recorded import LogError
+from scenarios.harness.logs.units import UNITS
 from scenarios.harness.plugins import near_misses
 
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
-
-_DEG, _KN_M_S = np.pi / 180.0, 1852.0 / 3600.0
-UNITS: dict[str, dict[str, float]] = {  # dimension -> unit -> factor to ours; the first one is ours
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "rate": {"rad/s": 1.0, "deg/s": _DEG, "dps": _DEG, "mrad/s": 1e-3},
-    "force": {"m/s^2": 1.0, "m/s2": 1.0, "g": G_M_S2, "mg": 1e-3 * G_M_S2},
-    "field": {"uT": 1.0, "nT": 1e-3, "gauss": 100.0, "G": 100.0, "mgauss": 0.1, "mG": 0.1},
-    "angle": {"rad": 1.0, "deg": _DEG, "1e-7deg": 1e-7 * _DEG},
-    "speed": {"m/s": 1.0, "cm/s": 0.01, "mm/s": 1e-3, "km/h": 1.0 / 3.6, "kn": _KN_M_S},
-    "length": {"m": 1.0, "cm": 0.01, "mm": 1e-3},
-    "number": {"1": 1.0},
-}
-
-
-class Quantity(NamedTuple):
-    """Something that a column may hold: its dimension, and names by which it goes in other people's logs."""
-
-    dimension: str
-    names: tuple[str, ...] = ()
-
-
-def _vector(name: str, dimension: str, *patterns: str) -> dict[str, Quantity]:
-    return {f"{name}.{a}": Quantity(dimension, tuple(p.replace("@", a) for p in patterns)) for a in "xyz"}
-
-
-QUANTITIES: dict[str, Quantity] = {
-    "time": Quantity("time", ("t", "time", "timestamp")),
-    **_vector("gyro", "rate", "gyro_@", "gyro_b_@", "gyr_@", "gyr@", "g@", "w@", "omega_@", "angular_velocity_@"),
-    **_vector(
-        "force", "force", "force_@", "force_b_@", "accel_@", "acc_@", "acc@", "a@", "f@", "linear_acceleration_@"
-    ),
-    **_vector("mag", "field", "mag_@", "mag_b_@", "mag@", "m@", "h@", "magnetic_field_@"),
-    "gps.new": Quantity("number", ("gps_new",)),
-    "gps.fix": Quantity("number", ("gps_fix", "fix_type")),
-    "gps.latitude": Quantity("angle", ("latitude", "lat", "gps_lat", "gps_latitude")),
-    "gps.longitude": Quantity("angle", ("longitude", "lon", "lng", "gps_lon", "gps_longitude")),
-    "gps.altitude": Quantity("length", ("altitude", "alt", "gps_alt", "gps_altitude")),
-    "gps.n": Quantity("length", ("gps_n", "gps_p_e_n")),
-    "gps.e": Quantity("length", ("gps_e", "gps_p_e_e")),
-    "gps.d": Quantity("length", ("gps_d", "gps_p_e_d")),
-    "gps.vn": Quantity("speed", ("gps_vn", "vn", "vel_n", "gps_v_e_n", "v_n")),
-    "gps.ve": Quantity("speed", ("gps_ve", "ve", "vel_e", "gps_v_e_e", "v_e")),
-    "gps.vd": Quantity("speed", ("gps_vd", "vd", "vel_d", "gps_v_e_d", "v_d")),
-    "gps.speed": Quantity("speed", ("gps_speed", "ground_speed", "groundspeed")),
-    "gps.course": Quantity("angle", ("gps_course", "course", "cog")),
-    "airspeed": Quantity("speed", ("airspeed", "ias", "tas")),
-    "height": Quantity("length", ("baro_height", "height", "baro_alt")),
-    "roll": Quantity("angle", ("roll", "phi", "ref_roll", "roll_ref")),
-    "pitch": Quantity("angle", ("pitch", "theta", "ref_pitch", "pitch_ref")),
-    "yaw": Quantity("angle", ("yaw", "psi", "heading", "ref_yaw", "yaw_ref")),
-    **{f"q{c}": Quantity("number", (f"q{c}", f"q_{c}", f"ref_q{c}", f"quat_{c}")) for c in "wxyz"},
-    **{
-        f"r{i}{j}": Quantity("number", (f"r{i}{j}", f"r_{'xyz'[i]}{'xyz'[j]}", f"truth_r_eb_{'xyz'[i]}{'xyz'[j]}"))
-        for i in range(3)
-        for j in range(3)
-    },
-}
-INERTIAL = ("gyro.x", "gyro.y", "gyro.z", "force.x", "force.y", "force.z")
-EULER = ("roll", "pitch", "yaw")
-QUATERNION = ("qx", "qy", "qz", "qw")  # in SciPy's order
-MATRIX = tuple(f"r{i}{j}" for i in range(3) for j in range(3))
-
-
-class Meaning(NamedTuple):
-    """What one column holds: the quantity, the factor to our unit, and whether somebody said the unit."""
-
-    quantity: str
-    factor: float = 1.0
-    told: bool = True
+Kind = Literal["truth", "filter", "firmware"]
+_KEYS = ("columns", "delimiter", "decimal", "skip_lines", "names", "struct", "axes", "force_reversed", "reference",
+         "origin_deg", "instruments", "suits", "withheld")  # fmt: skip
+_ENTRIES = ("is", "unit", "factor", "offset")
+_DIRECTIONS = {  # of a sensor axis -> its unit vector in the body: forward, right, down
+    "forward": (1, 0, 0), "back": (-1, 0, 0), "right": (0, 1, 0), "left": (0, -1, 0), "down": (0, 0, 1),
+    "up": (0, 0, -1),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class ColumnMap:
-    """The meaning of columns by their names, and how to get at them; see the module."""
+    """The meaning of columns by their names, and how to get at them; see the module.
+
+    columns : empty where they are to be recognised       delimiter : empty where it is to be found
+    R_bs : shape (3, 3), from the axes of the sensors to the body, None where they are the same
+    rivals : quantity -> columns that are named for it equally well      origin_deg : latitude and longitude
+    """
 
     columns: Mapping[str, Meaning] = field(default_factory=dict)
-    delimiter: str = ","
+    delimiter: str = ""
     skip_lines: int = 0
     struct: str = ""
     known: Mapping[str, Known] = field(default_factory=dict)
     name: str = "automatic names"
+    decimal: str = ""
+    names: tuple[str, ...] = ()
+    R_bs: Array | None = None
+    force_reversed: bool = False
+    reference: Kind = "filter"
+    origin_deg: tuple[float, float] | None = None
+    rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def of(self, header: Iterable[str], row_of_units: Mapping[str, str] | None = None) -> "ColumnMap":
+        """The same map, with the columns of `header` that are recognised where it names none."""
+        if self.columns:
+            return self
+        found, rivals = column_names.automatic(header, row_of_units)
+        return replace(self, columns=found, rivals=rivals)
+
+
+def automatic(header: Iterable[str], row_of_units: Mapping[str, str] | None = None) -> ColumnMap:
+    """Map of those columns of `header` whose names are understood; see `column_names`."""
+    return ColumnMap().of(header, row_of_units)
 
 
 def load(spec: str | Path) -> ColumnMap:
@@ -129,73 +103,207 @@ def load(spec: str | Path) -> ColumnMap:
         path = MAPS / f"{spec}.toml"
     if not path.is_file():
         offered = sorted(p.stem for p in MAPS.glob("*.toml"))
-        raise LogError(f"no column map {str(spec)!r}: {near_misses(str(spec), offered)} (one's own: a file.toml)")
+        raise LogError(f"no column map {str(spec)!r}: {near_misses(str(spec), offered)} (your own: a file.toml)")
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise LogError(f"{path}: {error}") from error
-    odd = sorted(set(data) - {"columns", "delimiter", "skip_lines", "struct", "instruments", "suits"})
-    entries = data.get("columns")
-    if odd or not isinstance(entries, dict):
-        raise LogError(f"{path}: {f'unknown entry {odd[0]!r}' if odd else 'no table [columns]'}")
-    delimiter, skip_lines, struct = data.get("delimiter", ","), data.get("skip_lines", 0), data.get("struct", "")
-    if not (isinstance(delimiter, str) and len(delimiter) == 1 and isinstance(skip_lines, int) and skip_lines >= 0):
-        raise LogError(f"{path}: delimiter must be one character and skip_lines a whole number, zero or more")
-    columns = {column: _meaning(str(text), f"{path}: {column} = {text!r}") for column, text in entries.items()}
-    known = {**data.get("suits", {}), **data.get("instruments", {})}  # [suits] is the older name
-    if not all(isinstance(v, int | float) for v in known.values()):
-        raise LogError(f"{path}: [instruments] must hold numbers by the names of properties")
-    twice = [m.quantity for m in columns.values()]
-    for quantity in twice:
-        if twice.count(quantity) > 1:
-            raise LogError(f"{path}: {quantity} is the meaning of two columns")
+        raise LogError(f"{path}: {' '.join(str(error).split())}") from error
+    for key in data:
+        if key not in _KEYS:
+            raise LogError(f"{path}: unknown entry {key!r}: {near_misses(key, _KEYS)}")
+    if not data:
+        raise LogError(f"{path}: empty; a map has a table [columns], or says axes, names, struct or [instruments]")
+    entries = data.get("columns", {})
+    if not isinstance(entries, dict):
+        raise LogError(f'{path}: columns must be a table: [columns], with a line name = "quantity unit" for each')
+    columns = {column: _meaning(entry, f"{path}: {column} = {_shown(entry)}") for column, entry in entries.items()}
+    _check_twice(columns, path)
     return ColumnMap(
         columns,
-        delimiter,
-        skip_lines,
-        str(struct),
-        {n: Known(v, "log", path.name) for n, v in known.items()},
-        path.stem,
+        skip_lines=_whole(data, path),
+        struct=_text(data, "struct", path),
+        known=_known(data, path),
+        name=path.stem,
+        **_form(data, path),
+        R_bs=_axes(data, path),
+        force_reversed=_flag(data, path),
+        reference=_kind(data, path),
+        origin_deg=_origin(data, path),
     )
 
 
-def _meaning(text: str, where: str) -> Meaning:
-    """The meaning spelled ``-force.z g``; `where` begins the message where it is none."""
-    spelled, _, unit = text.strip().partition(" ")
-    quantity = spelled.removeprefix("-")
+def _meaning(entry: Any, where: str) -> Meaning:
+    """The meaning spelled ``-force.z g``, or as a table; `where` begins the message where it is none."""
+    factor, offset = 1.0, 0.0
+    if isinstance(entry, dict):
+        for key in entry:
+            if key not in ("is", "unit", "factor", "offset"):
+                raise LogError(
+                    f"{where}: unknown entry {key!r}: {near_misses(key, ('is', 'unit', 'factor', 'offset'))}"
+                )
+        spelled, unit = entry.get("is"), entry.get("unit", "")
+        factor, offset = (_number(entry.get(k, d), k, where) for k, d in (("factor", 1.0), ("offset", 0.0)))
+        if factor == 0.0:
+            raise LogError(f"{where}: factor = 0 would make every value zero")
+    else:
+        spelled, _, unit = str(entry).strip().partition(" ")
+    if not isinstance(spelled, str) or not isinstance(unit, str):
+        raise LogError(f'{where}: write {{ is = "gyro.x", unit = "deg/s", factor = 0.07, offset = 0 }}')
+    quantity, unit = spelled.strip().removeprefix("-"), unit.strip()
     if quantity not in QUANTITIES:
         raise LogError(f"{where}: unknown quantity {quantity!r}: {near_misses(quantity, QUANTITIES)}")
-    units, unit = UNITS[QUANTITIES[quantity].dimension], unit.strip()
-    if unit and unit not in units:
-        raise LogError(f"{where}: unit {unit!r} of {quantity} must be one of {', '.join(units)}")
-    factor = units[unit] if unit else 1.0
-    return Meaning(quantity, -factor if spelled.startswith("-") else factor, bool(unit))
+    dimension = QUANTITIES[quantity].dimension
+    by_unit = units.factor_of(unit, dimension) if unit else 1.0
+    if by_unit is None and units.plain(unit) in units.COUNTS:
+        ours = next(iter(UNITS[dimension]))
+        raise LogError(
+            f"{where}: {unit} is no unit: say what one of them is, as in "
+            f'{{ is = "{quantity}", unit = "{ours}", factor = 0.001, offset = 0 }}'
+        )
+    if by_unit is None:
+        raise LogError(f"{where}: unit {unit!r} of {quantity} must be one of {', '.join(UNITS[dimension])}")
+    sign = -1.0 if spelled.strip().startswith("-") else 1.0
+    return Meaning(quantity, sign * factor * by_unit, bool(unit), offset)
 
 
-def automatic(header: Iterable[str]) -> ColumnMap:
-    """Map of those columns of `header` that go by a name in use; the first of two with one meaning."""
-    known: dict[tuple[str, str], list[str]] = {}
-    for quantity, (dimension, names) in QUANTITIES.items():
-        for name in (quantity.replace(".", "_"), *names):
-            known.setdefault((name, dimension), []).append(quantity)
-    columns: dict[str, Meaning] = {}
-    taken: set[str] = set()
-    for column in header:
-        meaning = _recognised(column, known)
-        if meaning is not None and meaning.quantity not in taken:
-            taken.add(meaning.quantity)
-            columns[column] = meaning
-    return ColumnMap(columns)
+def _shown(entry: Any) -> str:
+    if isinstance(entry, dict):
+        return "{ " + ", ".join(f"{k} = {v!r}" for k, v in entry.items()) + " }"
+    return repr(entry)
 
 
-def _recognised(column: str, known: Mapping[tuple[str, str], list[str]]) -> Meaning | None:
-    plain = re.sub(r"[^a-z0-9]+", "_", column.lower()).strip("_").removeprefix("measured_")
-    for dimension, units in UNITS.items():
-        if (plain, dimension) in known:
-            return Meaning(known[plain, dimension][0], told=False)
-        for unit, factor in units.items():
-            suffix = "_" + re.sub(r"[^a-z0-9]+", "_", unit.lower())
-            for stem in (plain.removesuffix(suffix), re.sub(rf"{suffix}_([xyzned])$", r"_\1", plain)):
-                if stem != plain and (stem, dimension) in known:
-                    return Meaning(known[stem, dimension][0], factor)
-    return None
+def _number(value: Any, key: str, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise LogError(f"{where}: {key} = {value!r} must be a number")
+    return float(value)
+
+
+def _check_twice(columns: Mapping[str, Meaning], path: Path) -> None:
+    """One column for each quantity, but for the time: columns of another length have one of their own."""
+    seen: dict[str, str] = {}
+    for column, meaning in columns.items():
+        quantity = meaning.quantity
+        if quantity in seen and quantity != "time":
+            raise LogError(f"{path}: {quantity} is the meaning of two columns, {seen[quantity]} and {column}")
+        seen[quantity] = column
+
+
+def matrix_of(column: str) -> str:
+    """The matrix or structure to which ``IMU.GyrX`` or ``IMU[3]`` belongs; empty for a column by itself."""
+    if column.endswith("]"):
+        return column.rpartition("[")[0]
+    return column.rpartition(".")[0]
+
+
+def _text(data: Mapping[str, Any], key: str, path: Path) -> str:
+    value = data.get(key, "")
+    if not isinstance(value, str):
+        raise LogError(f"{path}: {key} = {value!r} must be a text")
+    return value
+
+
+def _whole(data: Mapping[str, Any], path: Path) -> int:
+    value = data.get("skip_lines", 0)
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise LogError(f"{path}: skip_lines = {value!r} must be a whole number, zero or more")
+    return value
+
+
+def _flag(data: Mapping[str, Any], path: Path) -> bool:
+    value = data.get("force_reversed", False)
+    if not isinstance(value, bool):
+        raise LogError(f"{path}: force_reversed = {value!r} must be true or false")
+    return value
+
+
+def _form(data: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """How a text file is written: delimiter, decimal sign, names of columns."""
+    delimiter, decimal, names = _text(data, "delimiter", path), _text(data, "decimal", path), data.get("names", [])
+    if "delimiter" in data and len(delimiter) != 1:
+        raise LogError(f'{path}: delimiter = {delimiter!r} must be one character: "," ";" "|" "\\t", or " " for blanks')
+    if decimal not in ("", ".", ","):
+        raise LogError(f'{path}: decimal = {decimal!r} must be "." or ","')
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise LogError(f'{path}: names must be a list of texts, as in names = ["t", "gx"]')
+    return {"delimiter": delimiter, "decimal": decimal, "names": tuple(names)}
+
+
+def _kind(data: Mapping[str, Any], path: Path) -> Kind:
+    kind = data.get("reference", "filter")
+    if kind not in ("truth", "filter", "firmware"):
+        raise LogError(f"{path}: reference = {kind!r} must be truth, filter or firmware")
+    return cast(Kind, kind)
+
+
+def _axes(data: Mapping[str, Any], path: Path) -> Array | None:
+    """The rotation from the axes of the sensors to forward, right, down."""
+    spelled = _text(data, "axes", path)
+    if not spelled:
+        return None
+    words = spelled.lower().replace(",", "-").replace(" ", "-").split("-")
+    if len(words) == 1 and len(spelled) == 3:  # FLU
+        words = list(spelled.lower())
+    full = [next((d for d in _DIRECTIONS if d == w or (len(w) == 1 and d[0] == w)), "") for w in filter(None, words)]
+    R_bs = np.array([_DIRECTIONS[d] for d in full if d], dtype=np.float64).T
+    if len(full) != 3 or not all(full) or abs(abs(np.linalg.det(R_bs)) - 1.0) > 0.5:
+        raise LogError(
+            f"{path}: axes = {spelled!r}: say where x, y and z point, each of forward or back, right or left, down or "
+            'up, as in "forward-left-up"'
+        )
+    if np.linalg.det(R_bs) < 0.0:
+        raise LogError(f"{path}: axes = {spelled!r} are left-handed; those of an inertial unit are right-handed")
+    return None if np.array_equal(R_bs, np.eye(3)) else R_bs
+
+
+def _origin(data: Mapping[str, Any], path: Path) -> tuple[float, float] | None:
+    origin = data.get("origin_deg")
+    if origin is None:
+        return None
+    numbers = isinstance(origin, list) and all(isinstance(v, int | float) for v in origin) and len(origin) == 2
+    if not numbers or not (abs(origin[0]) <= 90.0 and abs(origin[1]) <= 360.0):
+        raise LogError(f"{path}: origin_deg = {origin!r} must be a latitude and a longitude in degrees")
+    return float(origin[0]), float(origin[1])
+
+
+def _known(data: Mapping[str, Any], path: Path) -> dict[str, Known]:
+    """The table ``[instruments]``; ``[suits]`` is its older name."""
+    found: dict[str, Known] = {}
+    for table in ("suits", "instruments"):
+        entries = data.get(table, {})
+        if not isinstance(entries, dict):
+            raise LogError(f"{path}: {table} must be a table: [{table}]")
+        for name, value in entries.items():
+            if name not in PROPERTIES and name not in _parameters():
+                possible = [*PROPERTIES, *_parameters()]
+                raise LogError(f"{path}: [{table}] {name}: no such property: {near_misses(name, possible)}")
+            if not isinstance(value, int | float) or not math.isfinite(value):
+                raise LogError(f"{path}: [{table}] {name} = {value!r} must be a number, true or false")
+            found[name] = Known(value, "log", path.name)
+    withheld = data.get("withheld", [])
+    if not isinstance(withheld, list):
+        raise LogError(f'{path}: withheld must be a list of properties, as in withheld = ["gps_rate_hz"]')
+    for name in withheld:
+        if name not in PROPERTIES or name in found:
+            why = "it has a value too" if name in found else near_misses(str(name), PROPERTIES)
+            raise LogError(f"{path}: withheld {name!r}: {why}")
+        found[name] = Known(PROPERTIES[name].assumed, "withheld", path.name)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _parameters() -> frozenset[str]:
+    """Names of the parameters of every registered estimator that can be loaded here."""
+    from dataclasses import is_dataclass
+
+    from scenarios.harness import plugins
+    from sim.params import dotted_fields
+
+    found: set[str] = set()
+    for name in plugins.estimators():
+        try:
+            params = getattr(plugins.load_estimator(name), "params", None)
+        except ValueError:  # one that lacks its package
+            continue
+        if is_dataclass(params):
+            found |= set(dotted_fields(params))
+    return frozenset(found)

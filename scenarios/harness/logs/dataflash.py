@@ -14,6 +14,7 @@ from estimator.interface import Array
 from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import streams, tabular
 from scenarios.harness.logs.ardupilot import FIX_3D, Parameters, year_of
+from scenarios.harness.logs.ardupilot_matlab import MatlabMessages
 from scenarios.harness.logs.dataflash_records import Clock, DataFlash, Records, own_time_s
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from scenarios.harness.logs.streams import IN_GAP, NO_FIX, UNHEALTHY, Kind, Stream
@@ -37,7 +38,12 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     ------
     LogError      one line: no such log, no inertial unit in it, or one that cannot be believed
     """
-    log = _Log(DataFlash(path))
+    return of_messages(DataFlash(path), imu)
+
+
+def of_messages(records: DataFlash | MatlabMessages, imu: int | None = None) -> RecordedLog:
+    """The log that these messages make; parameters and errors as `read`."""
+    log = _Log(records)
     inertial = log.inertial(imu)
     fixes, receiver = log.fixes()
     field, compass = log.field()
@@ -59,13 +65,13 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
         {**receiver, **compass, **pitot},
         log.parameters.log_imu(),
     )
-    return streams.recorded(path, messages, log.repairs)
+    return streams.recorded(log.path, messages, log.repairs)
 
 
 class _Log:
     """The streams of a log.  `others` lists what was read of several instances."""
 
-    def __init__(self, records: DataFlash) -> None:
+    def __init__(self, records: DataFlash | MatlabMessages) -> None:
         self.of, self.path, self.repairs = records, records.path, records.repairs
         self.parameters = Parameters.of(records)
         self.others = list[str]()

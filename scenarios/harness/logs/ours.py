@@ -1,12 +1,16 @@
 """Our own recordings: what was measured aboard, and the truth beside it."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.instruments import Known
+from scenarios.harness.logs import properties
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from sim import recording
+from sim.log import Flight
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
 from sim.story import setting
 
@@ -25,13 +29,33 @@ def read(path: Path) -> RecordedLog:
     if not len(flight.log):
         raise LogError(f"{path}: a flight without a tick")
     rows = flight.log.measured
-    has = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
-    instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(rows[new])))
+    air = (rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])
+    has = {"gps": rows["gps_new"], "magnetometer": rows["mag_new"], "airspeed": air}
+    instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
     reference = Reference(flight.log.truth["R_eb"], "truth", "the true attitude")
-    place = (
+    name = path.name if path.is_dir() else path.parent.name
+    known = {**_measured(rows), **known_of(flight)}
+    return RecordedLog(rows, name or path.name, instruments, reference, (), place_of(flight), known)
+
+
+def known_of(flight: Flight) -> dict[str, Known]:
+    """What the manifest of a flight says of the instruments aboard."""
+    known = flight.manifest.get("known", {})
+    return {name: Known(entry["value"], entry["source"]) for name, entry in known.items()}
+
+
+def place_of(flight: Flight) -> tuple[float, float]:
+    """Latitude and longitude of the launch point, degrees."""
+    return (
         float(setting(flight.manifest, "launch_latitude_deg", LATITUDE_DEG)),
         float(setting(flight.manifest, "launch_longitude_deg", LONGITUDE_DEG)),
     )
-    name = path.name if path.is_dir() else path.parent.name
-    known = {n: Known(k["value"], k["source"]) for n, k in flight.manifest.get("known", {}).items()}
-    return RecordedLog(rows, name or path.name, instruments, reference, (), place, known)
+
+
+def _measured(rows: NDArray[Any]) -> dict[str, Known]:
+    """What the rows say of the instruments, where the manifest does not: as of any other log."""
+    known = properties.measured(rows)
+    fixes = rows[rows["gps_new"] > 0]
+    if len(fixes):
+        known["gps_stamped"] = Known(bool(np.isfinite(fixes["gps_t_s"]).any()), "log", "stamps of the fixes")
+    return known

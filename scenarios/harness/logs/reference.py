@@ -21,7 +21,10 @@ from numpy.typing import NDArray
 
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
+from scenarios.harness.logs import accounts, properties
+from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.validity import usable
 
 COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
 LEAST_FIX = 3  # a fix of three dimensions
@@ -65,16 +68,20 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     rows["t_s"], rows["dt_s"] = table["t"], table["dt"]
     rows["gyro_b_rad_s"] = _vector(table, "gx", "gy", "gz")
     rows["force_b_m_s2"] = _vector(table, "ax", "ay", "az")
-    fixes = (table["gps_new"] > 0.0) & (table["gps_fix"] >= LEAST_FIX)
-    velocity, last = _held(_vector(table, "gps_vn", "gps_ve", "gps_vd"), fixes)
-    rows["gps_new"], rows["gps_valid"] = fixes, last >= 0
+    reported, lost = table["gps_new"] > 0.0, table["gps_fix"] < LEAST_FIX
+    ledger = Ledger()
+    fixes = reported & ~lost
+    if reported.any():
+        fixes = accounts.samples(ledger, "gps", reported, [(lost, accounts.NO_FIX)])
+    velocity = _held(_vector(table, "gps_vn", "gps_ve", "gps_vd"), fixes)
+    rows["gps_new"], rows["gps_valid"] = fixes, usable(fixes, table["t"], reported & lost)
     rows["gps_v_e_m_s"] = velocity
-    rows["gps_p_e_m"], _ = _held(_vector(table, "gps_n", "gps_e", "gps_d"), fixes)
-    rows["gps_t_s"] = np.where(last >= 0, table["t"][last], 0.0)
+    rows["gps_p_e_m"] = _held(_vector(table, "gps_n", "gps_e", "gps_d"), fixes)
+    rows["gps_t_s"] = np.nan  # when a fix was true is not in the file
     rows["gps_speed_m_s"] = np.hypot(velocity[:, 0], velocity[:, 1])
     rows["gps_course_rad"] = np.arctan2(velocity[:, 1], velocity[:, 0]) % (2.0 * np.pi)
     rows["mag_new"] = table["mag_new"] > 0.0
-    rows["mag_b_ut"], _ = _held(COUNT_UT * _vector(table, "mx", "my", "mz"), rows["mag_new"] > 0)
+    rows["mag_b_ut"] = _held(COUNT_UT * _vector(table, "mx", "my", "mz"), rows["mag_new"] > 0)
     flown_through_air = bool(np.any(table["airspeed"] != 0.0))
     rows["air_new"], rows["airspeed_m_s"] = flown_through_air, table["airspeed"]
     rows["baro_height_m"] = np.nan
@@ -85,7 +92,10 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     if attitudes is not None and "_ap2013_" in attitudes.name:
         for column, step in AP2013_STEPS.items():
             rows[column] = step * np.rint(rows[column] / step)
-    return RecordedLog(rows, path.name, tuple(instruments), attitudes, known=_known(path, attitudes))
+    known = {**properties.measured(rows), **_known(path, attitudes)}
+    if fixes.any():
+        known["gps_stamped"] = Known(False, "log", "no stamps of fixes")
+    return RecordedLog(rows, path.name, tuple(instruments), attitudes, known=known, ledger=ledger)
 
 
 def _known(path: Path, attitudes: Reference | None) -> dict[str, Known]:
@@ -145,7 +155,7 @@ def _vector(table: dict[str, Array], *names: str) -> Array:
     return np.stack([table[name] for name in names], axis=-1)
 
 
-def _held(values: Array, new: NDArray[np.bool_]) -> tuple[Array, NDArray[np.intp]]:
-    """`values` where `new`, held until the next, zero before the first; and the row each comes from, -1 for none."""
+def _held(values: Array, new: NDArray[np.bool_]) -> Array:
+    """`values` where `new`, held until the next, zero before the first."""
     last = np.maximum.accumulate(np.where(new, np.arange(len(values)), -1))
-    return np.where(last[:, None] >= 0, values[last], 0.0), last
+    return np.where(last[:, None] >= 0, values[last], 0.0)

@@ -19,7 +19,8 @@ from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
 from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import checks, gaps, tabular
-from scenarios.harness.logs.checks import AGAIN, NO_NUMBER
+from scenarios.harness.logs.accounts import NO_FIX as NO_FIX
+from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
@@ -31,7 +32,7 @@ FEW = 0.01  # a share of the fixes below this is damage
 FAR = "at a time far from its neighbours"
 OUTSIDE, IN_GAP = "outside the inertial record", "in a gap of the inertial record"
 REPLACED = "replaced by a later one in the same row"
-NO_FIX, UNHEALTHY = "no fix of three dimensions", "unhealthy"
+UNHEALTHY = "unhealthy"
 NO_ATTITUDE, NO_ROW, ALONE = "no attitude", "no inertial sample beside it", "no other attitude within 0.5 s"
 _BY_NAME = ("gyro.x", "gyro.y", "gyro.z", "force.x", "force.y", "force.z")
 _HAS = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
@@ -114,7 +115,7 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
     log = RecordedLog(
         rows, path.name, instruments, reference, tuple(repairs), place, {**known, **messages.known}, books.ledger
     )
-    log = checks.judged(log, source)
+    log = checks.judged(log, source, books.ledger)
     for stream, new in _HAS.items():
         if stream in log.ledger:
             log.ledger.use(stream, int(np.sum(log.rows[new] > 0)))
@@ -302,7 +303,7 @@ def _reference(
     books.leave_out("reference", good, ~(np.isfinite(stream.t_s) & np.isfinite(stream.values).all(axis=1)), NO_ATTITUDE)
     books.leave_out_far("reference", good, stream)
     times, first = np.unique(stream.t_s[good], return_index=True)
-    books.ledger.leave_out("reference", int(good.sum()) - len(times), AGAIN)
+    books.ledger.leave_out("reference", int(good.sum()) - len(times), REPEATED)
     R_eb = tabular.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
     known = np.isfinite(R_eb).all(axis=(1, 2))
     used = np.zeros(len(times), np.bool_)

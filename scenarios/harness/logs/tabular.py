@@ -1,216 +1,427 @@
-"""From named columns of numbers, as a text or MATLAB file holds them, to rows that estimators take."""
+"""From named columns of numbers, as a text or MATLAB file holds them, to rows that estimators take.
 
-from collections.abc import Mapping
-from dataclasses import replace
+A row of the file is an inertial sample, where it holds one, and may hold reports of other instruments.  Where a MATLAB
+file holds these in matrices of their own, each has its own times; a report is put into the first row whose time is not
+before its own, and of several in one row the last one counts.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-import pymap3d  # type: ignore[import-untyped]
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp  # type: ignore[import-untyped]
 
+from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
-from estimator.rotation import from_euler
 from estimator.screening import LONGEST_GAP_S
-from scenarios.harness.logs import checks
-from scenarios.harness.logs.column_map import EULER, INERTIAL, MATRIX, QUATERNION, ColumnMap
+from scenarios.harness.logs import accounts, attitudes, checks, fixes, properties
+from scenarios.harness.logs.attitudes import at_times as at_times
+from scenarios.harness.logs.attitudes import attitude as attitude
+from scenarios.harness.logs.column_map import ColumnMap
+from scenarios.harness.logs.ledger import Ledger
+from scenarios.harness.logs.quantities import EULER, FIELD, INERTIAL
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.units import COUNTS
+from scenarios.harness.logs.validity import usable
 
-LEAST_FIX = 3.0  # a fix of three dimensions
-_DEGREES = 180.0 / np.pi
 Table = dict[str, Array]
+FEWEST_FORCES = 5  # samples of the gyro for one of the accelerometer, at most
+REMEDY = (
+    "where the axes are forward, left, up: --columns forward-left-up; right, forward, up: --columns right-forward-up; "
+    "where the accelerometer reads gravity minus acceleration: --columns force-reversed; in a map of your own "
+    'axes = "forward-left-up" or force_reversed = true, or a minus sign before the quantity'
+)
 
 
-def take(columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source) -> tuple[Table, checks.Source]:
+@dataclass(slots=True)
+class Group:
+    """Columns of one length with times in common, by our names and in our units.
+
+    told : quantities whose unit somebody said      own : its clock is not that of the inertial unit: no value is held
+    """
+
+    table: Table
+    told: frozenset[str] = frozenset()
+    own: bool = False
+
+    @property
+    def n(self) -> int:
+        """Rows."""
+        return len(next(iter(self.table.values()), ()))
+
+    def has(self, *names: str) -> bool:
+        """Whether all of these quantities are in it."""
+        return all(name in self.table for name in names)
+
+
+def _alone(_column: str) -> str:
+    return ""
+
+
+def take(
+    columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source, of: Callable[[str], str] = _alone
+) -> tuple[list[Group], checks.Source]:
     """The columns that the map knows, by our names and in our units; and the source, which learns their names.
+
+    of : column -> the matrix or structure that it belongs to
 
     Raises
     ------
-    LogError      a column of the map that is not there, or one of another length
+    LogError      a column of the map that is not there, or two columns for one quantity
     """
     missing = [name for name in meanings.columns if name not in columns]
     if missing:
         raise LogError(
             f"{source.path}: no column {', '.join(missing)}, which the map {meanings.name} names; "
-            f"it has {', '.join(columns) or 'none'}"
+            f"it has {', '.join(source.offered or columns) or 'none'}"
         )
-    table = {m.quantity: m.factor * columns[name] for name, m in meanings.columns.items()}
-    sizes = {len(values) for values in table.values()}
-    if len(sizes) > 1:
-        raise LogError(f"{source.path}: columns of different lengths: {', '.join(str(n) for n in sorted(sizes))}")
-    own = {m.quantity: name for name, m in meanings.columns.items()}
+    if meanings.rivals:
+        quantity, names = next(iter(meanings.rivals.items()))
+        raise LogError(
+            f"{source.path}: {quantity} may be {' or '.join(names)}: say which in a column map (--columns MAP.toml)"
+        )
+    parts: dict[tuple[str, int], dict[str, Array]] = {}
+    told: dict[tuple[str, int], set[str]] = {}
+    own: dict[str, str] = {}
+    for name, m in meanings.columns.items():
+        values = columns[name]
+        part = (of(name), len(values))
+        table = parts.setdefault(part, {})
+        if m.quantity in table:
+            raise LogError(f"{source.path}: {m.quantity} is the meaning of two columns, {own[m.quantity]} and {name}")
+        # Without an offset nothing is subtracted: a number in our unit stays bit for bit.
+        if m.quantity == "time":
+            values = checks.unwrapped(values)
+        table[m.quantity] = m.factor * (values - m.offset) if m.offset else m.factor * values
+        told.setdefault(part, set()).update({m.quantity} if m.told else ())
+        own.setdefault(m.quantity, name)
     for vector in ("gyro", "force", "mag"):
         own[vector] = " ".join(own[name] for name in (f"{vector}.{a}" for a in "xyz") if name in own) or vector
-    source = replace(source, columns=own)
-    if not any(m.told for m in meanings.columns.values() if m.quantity in EULER):
-        _mend_angles(table)
-    return table, source
+    groups = _with_times({key: Group(table, frozenset(told[key])) for key, table in parts.items()}, source)
+    for group in groups:
+        turn(group, meanings)
+        if not group.told & set(EULER):
+            attitudes.mend_angles(group.table)
+    return groups, replace(source, columns=own, remedy=REMEDY)
 
 
-def recorded(columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source) -> RecordedLog:
+def _with_times(parts: Mapping[tuple[str, int], Group], source: checks.Source) -> list[Group]:
+    """One group for each clock: columns without a time of their own join those of the same length that have one."""
+    lengths = {n for (_, n), part in parts.items() if part.has("time")}
+    for (_, n), part in parts.items():
+        if n not in lengths and part.has("gps.time"):  # the one clock that these columns have
+            part.table["time"] = part.table.pop("gps.time")
+            part.told |= {"time"} & {q.replace("gps.time", "time") for q in part.told}
+        if n not in lengths and part.has("interval", "gyro.x"):  # a log that times its rows by their lengths
+            part.table["time"] = np.cumsum(np.nan_to_num(part.table["interval"]))
+            part.told |= {"time"}
+    groups = {key: part for key, part in parts.items() if part.has("time")}
+    for key, part in parts.items():
+        if key in groups:
+            continue
+        same = [group for (_, n), group in groups.items() if n == key[1]]
+        if not same:
+            what = f"{key[0]} " if key[0] else ""
+            if groups:
+                raise LogError(
+                    f"{source.path}: {what}({key[1]} rows: {', '.join(part.table)}) has no time: name a column of this "
+                    'length as "time" in the column map'
+                )
+            groups[key] = part
+            continue
+        for quantity, values in part.table.items():
+            if quantity in same[0].table:
+                raise LogError(f"{source.path}: {quantity} is the meaning of two columns")
+            same[0].table[quantity] = values
+        same[0].told |= part.told
+    return list(groups.values())
+
+
+def turn(group: Group, meanings: ColumnMap) -> None:
+    """Axes of the body, and the sign of a specific force, as the map says."""
+    table, R_bs = group.table, meanings.R_bs
+    if meanings.force_reversed:
+        for name in INERTIAL[3:]:
+            if name in table:
+                table[name] = -table[name]
+    for names in (INERTIAL[:3], INERTIAL[3:], FIELD):
+        if R_bs is not None and group.has(*names):
+            table.update(zip(names, R_bs @ np.array([table[name] for name in names]), strict=True))
+
+
+@dataclass(slots=True)
+class _Making:
+    """A log being made: its rows, what is known, the ledger and the repairs."""
+
+    rows: NDArray[Any]
+    ledger: Ledger
+    repairs: list[str]
+    known: dict[str, Known] = field(default_factory=dict)
+    place: tuple[float, float] | None = None
+
+
+def recorded(
+    columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source, of: Callable[[str], str] = _alone
+) -> RecordedLog:
     """The log that the columns hold, checked.
 
     Raises
     ------
     LogError      one line with the file, the row and the column
     """
-    table, source = take(columns, meanings, source)
-    missing = [name for name in ("time", *INERTIAL) if name not in table]
-    if missing:
-        raise LogError(
-            f"{source.path}: no column for {', '.join(missing)}; it has {', '.join(columns)}: "
-            "name them in a column map (--columns MAP.toml)"
-        )
+    groups, source = take(columns, meanings, source, of)
+    main = _main(groups, replace(source, offered=source.offered or tuple(columns)))
     repairs: list[str] = []
-    table["time"] = table["time"] * checks.clock_factor(table["time"], source, repairs)
-    keep = checks.kept(table["time"], {name: table[name] for name in INERTIAL}, source, repairs)
-    table = {name: values[keep] for name, values in table.items()}
-    rows = np.zeros(len(keep), MEASURED_DTYPE)
-    rows["t_s"], rows["dt_s"] = table["time"], np.nan
-    rows["gyro_b_rad_s"] = _stack(table, INERTIAL[:3])
-    rows["force_b_m_s2"] = _stack(table, INERTIAL[3:])
-    place = _take_gps(rows, table, repairs)
-    _take_rest(rows, table)
-    R_eb = attitude(table)
-    reference = None if R_eb is None else Reference(R_eb, "filter", f"attitude in {source.path.name}")
-    has = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
-    instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if rows[new].any()))
-    log = RecordedLog(rows, source.path.name, instruments, reference, tuple(repairs), place, meanings.known)
+    others = _meet(main, repairs) | _of_others(main)
+    factor = checks.clock_factor(main.table["time"], source, repairs)
+    for group in groups:
+        for name in ("time", "interval", "gps.time"):
+            if name in group.table and (group is main or name not in group.told):
+                group.table[name] = factor * group.table[name]
+    t_s, numbers = main.table["time"], np.column_stack([main.table[name] for name in INERTIAL])
+    inertial = np.flatnonzero(~others)
+    named = {name: numbers[inertial, i] for i, name in enumerate(INERTIAL)}
+    of_file = replace(source, row=lambda k: source.row(int(inertial[k])))
+    keep = inertial[checks.kept(t_s[inertial], named, of_file, repairs)]
+    made = _Making(np.zeros(len(keep), MEASURED_DTYPE), Ledger(), repairs)
+    accounts.inertial(made.ledger, t_s, numbers, keep, inertial)
+    rows = made.rows
+    rows["t_s"], rows["dt_s"] = t_s[keep], _intervals(main, keep, repairs)
+    rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(numbers[keep], 2)
+    rows["baro_height_m"] = np.nan
+    for group in groups:
+        order = np.argsort(group.table["time"], kind="stable")  # what has no time comes last
+        in_order = {name: values[order] for name, values in group.table.items()}
+        group = Group(in_order, group.told, group is not main)
+        _take_fixes(made, group)
+        _take_field(made, group)
+        _take_air(made, group)
+    reference = _take_attitude(made, groups, main, keep, source, meanings)
+    known = {**properties.measured(rows), **made.known, **meanings.known}
+    has_air = bool(np.any((rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])))
+    has = {"gps": rows["gps_new"].any(), "magnetometer": rows["mag_new"].any(), "airspeed": has_air}
+    instruments = ("gyro", "accelerometer", *(name for name, there in has.items() if there))
+    place = meanings.origin_deg or made.place
+    log = RecordedLog(
+        rows, source.path.name, instruments, reference, tuple(repairs), place, known, made.ledger
+    )  # fmt: skip
     return checks.judged(log, source)
 
 
-def attitude(table: Table) -> Array | None:
-    """The attitude that the columns hold, shape (N, 3, 3), NaN where there is none; None without such columns.
+def _main(groups: list[Group], source: checks.Source) -> Group:
+    """The group with the gyro, and the accelerometer at its times; LogError where something is missing."""
+    main = next((g for g in groups if g.has(*INERTIAL[:3])), None)
+    force = next((g for g in groups if g.has(*INERTIAL[3:])), None)
+    if main is not None and force is not None and main is not force and main.has("time"):
+        order = np.argsort(force.table["time"], kind="stable")
+        times = force.table["time"][order]
+        for name in INERTIAL[3:]:
+            main.table[name] = interpolated(main.table["time"], times, force.table[name][order])
+    found = {name for group in groups for name in group.table}
+    missing = [name for name in ("time", *INERTIAL) if name not in (main.table if main else found)]
+    if main is None or missing:
+        raise LogError(
+            f"{source.path}: no column for {', '.join(missing)}; it has {', '.join(source.offered)}: "
+            f"name them in a column map (--columns MAP.toml){_counts(source.offered, missing[0] if missing else '')}"
+        )
+    return main
 
-    A filter that has not started reports zeros: level and to the north, all three exactly, is no attitude then.
-    """
-    if all(name in table for name in MATRIX):
-        R_eb = _stack(table, MATRIX).reshape(-1, 3, 3)
-        known = np.abs(R_eb @ R_eb.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < 0.1
-    elif all(name in table for name in QUATERNION):
-        quaternion = _stack(table, QUATERNION)
-        known = np.asarray(np.abs(np.linalg.norm(quaternion, axis=1) - 1.0) < 0.1)
-        R_eb = np.full((len(known), 3, 3), np.nan)
-        if known.any():
-            R_eb[known] = Rotation.from_quat(quaternion[known]).as_matrix()
-    elif all(name in table for name in EULER):
-        angles = _stack(table, EULER)
-        known = np.isfinite(angles).all(axis=1) & np.maximum.accumulate(np.any(angles != 0.0, axis=1))
-        R_eb = from_euler(*angles.T)
+
+def _counts(offered: tuple[str, ...], missing: str) -> str:
+    """What to write for a column that counts, whose unit only its maker knows."""
+    for name in offered:
+        inside = re.search(r"[(\[]\s*([^)\]]+?)\s*[)\]]", name)
+        if inside and inside[1].lower() in COUNTS:
+            return f', one in {inside[1]} as "{name}" = {{ is = "{missing}", unit = "deg/s", factor = 0.07 }}'
+    return ""
+
+
+def _meet(main: Group, repairs: list[str]) -> NDArray[np.bool_]:
+    """Bring the accelerometer to the times of the gyro, where the two stand in rows of their own; which are its."""
+    gyro, force = (np.isfinite([main.table[n] for n in names]).all(axis=0) for names in (INERTIAL[:3], INERTIAL[3:]))
+    if 2 * np.sum(gyro & force) >= np.sum(gyro) or np.sum(force) * FEWEST_FORCES < np.sum(gyro):
+        return np.zeros(main.n, np.bool_)
+    order = np.argsort(main.table["time"], kind="stable")
+    for name in INERTIAL[3:]:
+        found = interpolated(main.table["time"], main.table["time"][order], main.table[name][order])
+        main.table[name] = np.where(gyro, found, np.nan)
+    repairs.append(f"accelerometer in {np.sum(force & ~gyro)} rows of its own: interpolated to the rows of the gyro")
+    return np.asarray(force & ~gyro)
+
+
+def _of_others(main: Group) -> NDArray[np.bool_]:
+    """Rows of other instruments: without an inertial reading, but with one that most inertial rows do not have."""
+    none = ~np.isfinite([main.table[name] for name in INERTIAL]).any(axis=0)
+    others = np.zeros(main.n, np.bool_)
+    if none.any() and not none.all():
+        for name, values in main.table.items():
+            there = np.isfinite(values)
+            if name not in ("time", "interval", *INERTIAL) and 2 * np.sum(there & ~none) < np.sum(~none):
+                others |= none & there
+    return others
+
+
+def interpolated(t_s: Array, times: Array, values: Array) -> Array:
+    """Values at other times, NaN outside them and in gaps."""
+    known = np.isfinite(times) & np.isfinite(values)
+    times, values = times[known], values[known]
+    if not len(times):
+        return np.full(len(t_s), np.nan)
+    after = np.clip(np.searchsorted(times, t_s), 0, len(times) - 1)
+    before = np.maximum(after - 1, 0)
+    inside = (times[after] >= t_s) & ((times[before] <= t_s) | (times[after] == t_s))
+    usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    inside &= times[after] - times[before] <= max(5.0 * usual, 0.0) + 1e-12
+    return np.where(inside, np.interp(t_s, times, values), np.nan)
+
+
+def _intervals(main: Group, keep: NDArray[np.intp], repairs: list[str]) -> Array:
+    """Intervals that the file tells, NaN where it does not or they cannot be those between its rows."""
+    if not main.has("interval"):
+        return np.full(len(keep), np.nan)
+    said = main.table["interval"][keep]
+    steps = np.diff(main.table["time"][keep])
+    usual, between = np.nanmedian(said) if np.isfinite(said).any() else 0.0, np.median(steps) if len(steps) else 0.0
+    if not 0.8 * between <= usual <= 1.25 * between:
+        repairs.append(f"intervals of {usual:g} s are not those between the rows, {between:g} s: not used")
+        return np.full(len(keep), np.nan)
+    return np.where(said > 0.0, said, np.nan)
+
+
+def _put(
+    made: _Making, stream: str, t_s: Array, read: NDArray[np.bool_], why: list[tuple[NDArray[np.bool_], str]]
+) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
+    """Rows in which a sample of the `stream` arrives, and for each row the last sample so far, -1 before the first."""
+    rows_s = made.rows["t_s"]
+    at = np.searchsorted(rows_s, t_s)
+    why = [
+        *why, (~np.isfinite(t_s), accounts.NO_TIME), (at >= len(rows_s), accounts.AFTER),
+        (t_s < rows_s[0] - checks.LATEST_S, accounts.BEFORE),
+    ]  # fmt: skip
+    good = accounts.samples(made.ledger, stream, read, why)
+    index = np.flatnonzero(good)
+    last = np.full(len(rows_s), -1)
+    last[at[index]] = index  # of several the last one stays
+    new = last >= 0
+    made.ledger.leave_out(stream, len(index) - int(new.sum()), accounts.IN_ONE_ROW)
+    made.ledger.use(stream, int(new.sum()))
+    return new, np.maximum.accumulate(last)
+
+
+def _held(values: Array, last: NDArray[np.intp], before: float = 0.0) -> Array:
+    """`values` of the samples `last`, `before` the first one."""
+    shape = (len(last),) + (1,) * (values.ndim - 1)
+    return np.where((last >= 0).reshape(shape), values[last], before)
+
+
+def _take_fixes(made: _Making, group: Group) -> None:
+    """Fill the GPS columns."""
+    rows, table, t_s = made.rows, group.table, group.table["time"]
+    found = fixes.reports(table, group.told, made.repairs, each=group.own)
+    if found is None:
+        return
+    new, last = _put(made, "gps", t_s, found.read, found.reasons)
+    if not new.any():
+        return
+    made.place = made.place or found.place
+    rows["gps_new"] = new
+    position = found.values[:, :3]
+    known = np.isfinite(position).all(axis=1) & ~found.lost  # a report without a position leaves that of the one before
+    kept = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
+    rows["gps_p_e_m"] = _held(_held(position, kept), last)
+    velocity = _held(found.values[:, 3:8], last)
+    rows["gps_v_e_m_s"], rows["gps_speed_m_s"], rows["gps_course_rad"] = velocity[:, :3], velocity[:, 3], velocity[:, 4]
+    stamps = _held(found.values[:, 8], last, np.nan)
+    stamped = fixes.on_this_clock(stamps[new], rows["t_s"][new], made.repairs)
+    rows["gps_t_s"] = np.where(last >= 0, stamps, 0.0) if stamped else np.nan
+    rows["gps_valid"] = _valid(table, t_s, found.lost, new, rows["t_s"])
+    made.known["gps_stamped"] = Known(stamped, "log", "stamps of the fixes" if stamped else "no stamps of fixes")
+
+
+def _valid(
+    table: Table, t_s: Array, lost: NDArray[np.bool_], new: NDArray[np.bool_], rows_s: Array
+) -> NDArray[np.bool_]:
+    """Rows in which the last fix is usable: as the file says, else see `usable`."""
+    if "gps.valid" in table:
+        said = np.flatnonzero(np.isfinite(table["gps.valid"]) & np.isfinite(t_s))
+        before = np.searchsorted(t_s[said], rows_s, side="right") - 1
+        return np.asarray((before >= 0) & (table["gps.valid"][said[before]] > 0.0)) if len(said) else new & False
+    at = np.searchsorted(rows_s, t_s[lost])
+    lost_rows = np.zeros(len(rows_s), np.bool_)
+    lost_rows[at[at < len(rows_s)]] = True
+    return usable(new, rows_s, lost_rows)
+
+
+def _take_field(made: _Making, group: Group) -> None:
+    """Fill the magnetometer's columns; without ``mag.new`` a sample arrives where its values change."""
+    if not group.has(*FIELD):
+        return
+    field_ut = np.column_stack([group.table[name] for name in FIELD])
+    if group.has("mag.new"):
+        read: NDArray[np.bool_] = np.asarray(group.table["mag.new"] > 0.0)
     else:
+        there = np.isfinite(field_ut)
+        changed = np.any(there[1:] & (field_ut[1:] != field_ut[:-1]), axis=1)
+        first = there[:1].any(axis=1)
+        read = np.asarray(there.any(axis=1)) if group.own else np.concatenate((first, changed))
+    broken = np.asarray(~np.isfinite(field_ut).all(axis=1))
+    new, last = _put(made, "magnetometer", group.table["time"], read, [(broken, accounts.NO_NUMBER)])
+    made.rows["mag_new"] |= new
+    made.rows["mag_b_ut"] = _held(np.where(broken[:, None], 0.0, field_ut), last)
+
+
+def _take_air(made: _Making, group: Group) -> None:
+    """Fill airspeed and height; without ``air.new`` and ``height.new`` each number is a sample."""
+    rows, table = made.rows, group.table
+    for stream, quantity, column, flags in (
+        ("airspeed", "airspeed", "airspeed_m_s", ("air.new",)),
+        ("barometer", "height", "baro_height_m", ("height.new", "air.new")),
+    ):
+        if quantity not in table:
+            continue
+        flag = next((name for name in flags if name in table), None)
+        there = np.isfinite(table[quantity])
+        read = there if flag is None else table[flag] > 0.0
+        if flag == "air.new":  # of the other of the two where this one has no number
+            other = table.get("height" if quantity == "airspeed" else "airspeed", np.full(group.n, np.nan))
+            read = read & (there | ~np.isfinite(other))
+        new, last = _put(made, stream, table["time"], np.asarray(read), [(~there, accounts.NO_NUMBER)])
+        if new.any():
+            rows[column] = _held(table[quantity], last, np.nan)
+            if quantity == "airspeed" or "air.new" in table:
+                rows["air_new"] |= new
+    if "height" in table and "airspeed" not in made.ledger and rows["air_new"].any():
+        rows["airspeed_m_s"] = np.nan  # air data without a pitot tube
+
+
+def _take_attitude(
+    made: _Making, groups: list[Group], main: Group, keep: NDArray[np.intp], source: checks.Source, meanings: ColumnMap
+) -> Reference | None:
+    """The attitude in the file, at the times of the rows; interpolated where it stands between them."""
+    group = next((g for g in groups if attitudes.form_of(g.table)), None)
+    if group is None:
         return None
-    return np.where(known[:, None, None], R_eb, np.nan)
-
-
-def at_times(t_s: Array, R_eb: Array, times_s: Array) -> Array:
-    """Attitude `R_eb` of the times `t_s` at other times, on the shortest way, NaN where it is too far off."""
-    known = np.isfinite(R_eb).all(axis=(1, 2)) & np.isfinite(t_s)
-    found = np.full((len(times_s), 3, 3), np.nan)
-    t_s, first = np.unique(t_s[known], return_index=True)
-    if len(t_s) < 2:
-        return found
-    after = np.clip(np.searchsorted(t_s, times_s), 1, len(t_s) - 1)
-    inside = (times_s >= t_s[0]) & (times_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] <= LONGEST_GAP_S)
-    if inside.any():
-        found[inside] = Slerp(t_s, Rotation.from_matrix(R_eb[known][first]))(times_s[inside]).as_matrix()
-    return found
-
-
-def _mend_angles(table: Table) -> None:
-    """Angles whose unit nobody said are degrees where they exceed what radians can be."""
-    if all(name in table for name in EULER):
-        roll, pitch = (np.nanmax(np.abs(table[name]), initial=0.0) for name in ("roll", "pitch"))
-        if roll > 3.2 or pitch > 1.6:
-            for name in EULER:
-                table[name] = table[name] / _DEGREES
-
-
-def _take_gps(rows: NDArray[np.void], table: Table, repairs: list[str]) -> tuple[float, float] | None:
-    """Fill the GPS columns of `rows`; returns latitude and longitude of the first fix, degrees, where known."""
-    position, place = _position(table)
-    velocity = _velocity(table)
-    if velocity is None:
-        if any(name.startswith("gps.") for name in table):
-            repairs.append("GPS without a velocity (gps.vn and gps.ve, or gps.speed and gps.course): not used")
+    R_all = attitudes.attitude(group.table)
+    if R_all is None:
         return None
-    new = _arrivals(table, velocity)
-    held, last = _held(np.column_stack((position, velocity)), new)
-    rows["gps_new"], rows["gps_valid"] = new, last >= 0
-    rows["gps_t_s"] = np.where(last >= 0, rows["t_s"][last], 0.0)
-    rows["gps_p_e_m"], rows["gps_v_e_m_s"] = held[:, :3], held[:, 3:]
-    rows["gps_speed_m_s"] = np.hypot(held[:, 3], held[:, 4])
-    rows["gps_course_rad"] = np.arctan2(held[:, 4], held[:, 3]) % (2.0 * np.pi)
-    return place
-
-
-def _arrivals(table: Table, velocity: Array) -> NDArray[np.bool_]:
-    """Rows in which a fix arrived: as a column says, else where the values are others than in the row before."""
-    good = np.asarray(np.isfinite(velocity).all(axis=1))
-    if "gps.fix" in table:
-        good &= table["gps.fix"] >= LEAST_FIX
-    if "gps.new" in table:
-        return good & (table["gps.new"] > 0.0)
-    told = [v for name, v in table.items() if name.startswith("gps.") and name != "gps.fix"]
-    sparse = ~good.all()  # empty between the fixes: then the first one counts, which may else be a filler
-    before = np.column_stack(told)
-    changed = np.zeros(len(good), np.bool_)
-    changed[1:] = np.any(before[1:] != before[:-1], axis=1)
-    changed[0] = sparse
-    return good & changed
-
-
-def _velocity(table: Table) -> Array | None:
-    if "gps.vn" in table and "gps.ve" in table:
-        n, e = table["gps.vn"], table["gps.ve"]
-    elif "gps.speed" in table and "gps.course" in table:
-        speed, course = table["gps.speed"], table["gps.course"]
-        if np.nanmax(np.abs(course), initial=0.0) > 2.0 * np.pi + 0.01:
-            course = course / _DEGREES
-        n, e = speed * np.cos(course), speed * np.sin(course)
-    else:
+    read, why = attitudes.reasons(group.table, R_all)
+    t_s, rows_s = group.table["time"], made.rows["t_s"]
+    used = np.isfinite(R_all).all(axis=(1, 2)) & np.isfinite(t_s)
+    R_eb = np.full((len(rows_s), 3, 3), np.nan)
+    if group is main:
+        R_eb = R_all[keep]
+        elsewhere = np.ones(len(t_s), np.bool_)
+        elsewhere[keep] = False
+        why.append((elsewhere & np.isin(t_s, rows_s), accounts.REPEATED))
+    between = ~np.isfinite(R_eb).all(axis=(1, 2))
+    if between.any():
+        R_eb[between] = at_times(t_s, R_all, rows_s[between])
+    beyond = ~((t_s >= rows_s[0] - LONGEST_GAP_S) & (t_s <= rows_s[-1] + LONGEST_GAP_S))
+    good = accounts.samples(made.ledger, "reference", read, [*why, (beyond, accounts.OUTSIDE)])
+    made.ledger.use("reference", int(good.sum()))
+    if not np.any(used):
+        made.repairs.append("the attitude in it is none in any row: not used")
         return None
-    return np.column_stack((n, e, table.get("gps.vd", np.zeros(len(n)))))
-
-
-def _position(table: Table) -> tuple[Array, tuple[float, float] | None]:
-    """Position from the first fix on, shape (N, 3), zero where there is none; and where that first fix was."""
-    n = len(table["time"])
-    if not ("gps.latitude" in table and "gps.longitude" in table):
-        return np.column_stack([np.nan_to_num(table.get(f"gps.{a}", np.zeros(n))) for a in "ned"]), None
-    # Degrees without a unit exceed what radians can be anywhere but next to the equator and Greenwich.
-    largest = max(np.nanmax(np.abs(table[name]), initial=0.0) for name in ("gps.latitude", "gps.longitude"))
-    scale = 1.0 if largest > 3.2 else _DEGREES
-    latitude, longitude = scale * table["gps.latitude"], scale * table["gps.longitude"]
-    altitude = table.get("gps.altitude", np.zeros(n))
-    there = np.isfinite(latitude + longitude + altitude) & (np.abs(latitude) <= 90.0) & (latitude != 0.0)
-    # Placeholders before the first fix are held and round; a fix is where the values first change.
-    moved = np.flatnonzero(there[1:] & (np.diff(latitude) != 0.0)) + 1
-    if not there.any():
-        return np.zeros((n, 3)), None
-    first = int(moved[0]) if len(moved) else int(np.flatnonzero(there)[0])
-    origin = latitude[first], longitude[first], altitude[first]
-    ned = np.zeros((n, 3))
-    ned[there] = np.column_stack(pymap3d.geodetic2ned(latitude[there], longitude[there], altitude[there], *origin))
-    return ned, (float(origin[0]), float(origin[1]))
-
-
-def _take_rest(rows: NDArray[np.void], table: Table) -> None:
-    """Fill magnetometer and air data; a sample of the former arrives where its values change."""
-    if all(f"mag.{a}" in table for a in "xyz"):
-        field = _stack(table, tuple(f"mag.{a}" for a in "xyz"))
-        changed = np.concatenate(([True], np.any(field[1:] != field[:-1], axis=1)))
-        rows["mag_new"] = changed & np.isfinite(field).all(axis=1)
-        rows["mag_b_ut"], _ = _held(field, rows["mag_new"] > 0)
-    rows["baro_height_m"] = table.get("height", np.full(len(rows), np.nan))
-    if "airspeed" in table:
-        rows["air_new"] = np.isfinite(table["airspeed"])
-        rows["airspeed_m_s"] = np.nan_to_num(table["airspeed"])
-
-
-def _stack(table: Table, names: tuple[str, ...]) -> Array:
-    return np.column_stack([table[name] for name in names])
-
-
-def _held(values: Array, new: NDArray[np.bool_]) -> tuple[Array, NDArray[np.intp]]:
-    """`values` where `new`, held until the next, zero before the first; and the row each comes from, -1 for none."""
-    last = np.maximum.accumulate(np.where(new, np.arange(len(values)), -1))
-    return np.where(last[:, None] >= 0, values[last], 0.0), last
+    return Reference(R_eb, meanings.reference, f"attitude in {source.path.name}")

@@ -1,0 +1,122 @@
+"""A recorded flight as a text log: what was measured aboard in columns, the true attitude beside it, and its map.
+
+A value stands in the row in which it arrived, and the cells below it are empty until the next.  Numbers are written
+with as many digits as bring them back bit for bit.  The column map beside it carries what is known of the
+instruments: properties that are withheld, unknown or only assumed are not in it.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.instruments import Known
+from estimator.interface import Array
+from scenarios.harness.logs import ours, properties
+from sim.log import Flight
+
+KNOWN_BY = ("set", "data sheet", "log")  # sources of a property that is knowledge
+
+
+class Column(NamedTuple):
+    """One column of the file: its name, what the map says of it, and its numbers; NaN is an empty cell."""
+
+    name: str
+    meaning: str
+    values: Array
+
+
+def columns(flight: Flight) -> list[Column]:
+    """The columns of `flight`; those of an instrument that is not aboard, or never reported, are left out."""
+    rows, known = flight.log.measured, ours.known_of(flight)
+    found = [Column("time_s", "time s", rows["t_s"]), Column("interval_s", "interval s", rows["dt_s"])]
+    found += _vector("gyro_{}_rad_s", "gyro.{} rad/s", rows["gyro_b_rad_s"], "xyz")
+    found += _vector("force_{}_m_s2", "force.{} m/s^2", rows["force_b_m_s2"], "xyz")
+    if rows["gps_new"].any():
+        found += _gps(rows, stamped=_is_stamped(known))
+    if rows["mag_new"].any():
+        new = rows["mag_new"] > 0
+        found.append(Column("mag_new", "mag.new", rows["mag_new"].astype(np.float64)))
+        found += _vector("mag_{}_ut", "mag.{} uT", _where(new, rows["mag_b_ut"]), "xyz")
+    if rows["air_new"].any():
+        new = rows["air_new"] > 0
+        found.append(Column("air_new", "air.new", rows["air_new"].astype(np.float64)))
+        for name, meaning, column in (
+            ("airspeed_m_s", "airspeed m/s", "airspeed_m_s"), ("baro_height_m", "height m", "baro_height_m"),
+        ):  # fmt: skip
+            if np.isfinite(rows[column][new]).any():
+                found.append(Column(name, meaning, _where(new, rows[column])))
+    R_eb = flight.log.truth["R_eb"]
+    found += [Column(f"r{i}{j}", f"r{i}{j}", R_eb[:, i, j]) for i in range(3) for j in range(3)]
+    return found
+
+
+def _gps(rows: Any, *, stamped: bool) -> list[Column]:
+    new = rows["gps_new"] > 0
+    found = [Column(f"gps_{flag}", f"gps.{flag}", rows[f"gps_{flag}"].astype(np.float64)) for flag in ("new", "valid")]
+    if stamped and np.isfinite(rows["gps_t_s"][new]).any():
+        found.append(Column("gps_t_s", "gps.time s", _where(new, rows["gps_t_s"])))
+    found += _vector("gps_{}_m", "gps.{} m", _where(new, rows["gps_p_e_m"]), "ned")
+    found += _vector("gps_v{}_m_s", "gps.v{} m/s", _where(new, rows["gps_v_e_m_s"]), "ned")
+    found.append(Column("gps_speed_m_s", "gps.speed m/s", _where(new, rows["gps_speed_m_s"])))
+    found.append(Column("gps_course_rad", "gps.course rad", _where(new, rows["gps_course_rad"])))
+    return found
+
+
+def _is_stamped(known: dict[str, Known]) -> bool:
+    """Whether the stamps of the fixes are known to be there; an older recording says nothing of it."""
+    entry = known.get("gps_stamped")
+    return entry is None or (bool(entry.value) and entry.source in KNOWN_BY)
+
+
+def _vector(name: str, meaning: str, values: Array, axes: str) -> list[Column]:
+    return [Column(name.format(a), meaning.format(a), values[:, i]) for i, a in enumerate(axes)]
+
+
+def _where(new: NDArray[np.bool_], values: Array) -> Array:
+    return np.where(new if values.ndim == 1 else new[:, None], values, np.nan)
+
+
+def to_csv(found: list[Column]) -> str:
+    """The text of the log."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([column.name for column in found])
+    writer.writerows(zip(*(_cells(column.values) for column in found), strict=True))
+    return text.getvalue()
+
+
+def _cells(values: Array) -> Iterator[str]:
+    """Numbers in the fewest digits that bring them back bit for bit."""
+    return ("" if v != v else str(int(v)) if v.is_integer() and abs(v) < 1e15 and (v or str(v) == "0.0") else repr(v)
+            for v in values.tolist())  # fmt: skip
+
+
+def to_map(found: list[Column], flight: Flight, name: str) -> str:
+    """The column map of the log `name`, as TOML."""
+    latitude_deg, longitude_deg = ours.place_of(flight)
+    known = ours.known_of(flight)
+    hidden = [n for n in properties.MEASURED if n in known and known[n].source not in KNOWN_BY]
+    lines = [
+        f"# {name}: what its columns mean, and what is known of the instruments aboard.",
+        'delimiter = ","',
+        'decimal = "."',
+        'reference = "truth"',
+        f"origin_deg = [{latitude_deg!r}, {longitude_deg!r}]",
+        *([f"withheld = {json.dumps(hidden)}"] if hidden else []),
+        "",
+        "[columns]",
+        *(f'{column.name} = "{column.meaning}"' for column in found),
+    ]
+    given = {n: k.value for n, k in known.items() if k.source in KNOWN_BY and isinstance(k.value, bool | int | float)}
+    if given:
+        lines += ["", "[instruments]", *(f"{n} = {_toml(value)}" for n, value in given.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: bool | int | float) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)

@@ -1,0 +1,84 @@
+"""Attitudes that a file holds as angles, a quaternion or a matrix, and attitudes at other times."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp  # type: ignore[import-untyped]
+
+from estimator.interface import Array
+from estimator.rotation import from_euler
+from estimator.screening import LONGEST_GAP_S
+from scenarios.harness.logs import accounts
+from scenarios.harness.logs.quantities import EULER, MATRIX, QUATERNION
+
+NOT_STARTED = "of a filter that had not started"
+NO_ROTATION = "no rotation"
+Table = dict[str, Array]
+
+
+def form_of(table: Mapping[str, Array]) -> tuple[str, ...]:
+    """The columns that hold an attitude: of a matrix, a quaternion or three angles; empty where none do."""
+    return next((names for names in (MATRIX, QUATERNION, EULER) if all(name in table for name in names)), ())
+
+
+def attitude(table: Mapping[str, Array]) -> Array | None:
+    """The attitude that the columns hold, shape (N, 3, 3), NaN where there is none; None without such columns.
+
+    A filter that has not started reports zeros: level and to the north, all three exactly, is no attitude then.
+    """
+    names = form_of(table)
+    if not names:
+        return None
+    values = np.column_stack([table[name] for name in names])
+    if names == MATRIX:
+        R_eb = values.reshape(-1, 3, 3)
+        known = np.abs(R_eb @ R_eb.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < 0.1
+        known &= np.linalg.det(np.where(known[:, None, None], R_eb, np.eye(3))) > 0.0
+    elif names == QUATERNION:
+        known = np.asarray(np.abs(np.linalg.norm(values, axis=1) - 1.0) < 0.1)
+        R_eb = np.full((len(known), 3, 3), np.nan)
+        if known.any():
+            R_eb[known] = Rotation.from_quat(values[known]).as_matrix()
+    else:
+        known = np.isfinite(values).all(axis=1) & np.maximum.accumulate(np.any(np.nan_to_num(values) != 0.0, axis=1))
+        R_eb = from_euler(*values.T)
+    return np.where(known[:, None, None], R_eb, np.nan)
+
+
+def reasons(table: Mapping[str, Array], R_eb: Array) -> tuple[NDArray[np.bool_], list[tuple[NDArray[np.bool_], str]]]:
+    """Rows in which the file holds something of an attitude, and why some of them hold none; see `accounts.samples`."""
+    values = np.column_stack([table[name] for name in form_of(table)])
+    complete = np.asarray(np.isfinite(values).all(axis=1))
+    unknown = np.asarray(~np.isfinite(R_eb).all(axis=(1, 2)))
+    zeros = np.asarray(complete & (values == 0.0).all(axis=1))
+    why: list[tuple[NDArray[np.bool_], str]] = [
+        (~complete, accounts.NO_NUMBER), (unknown & zeros, NOT_STARTED), (unknown, NO_ROTATION),
+    ]  # fmt: skip
+    return np.asarray(np.isfinite(values).any(axis=1)), why
+
+
+def mend_angles(table: Table) -> bool:
+    """Make angles whose unit nobody said radians, where they exceed what radians can be; whether they did."""
+    if not all(name in table for name in EULER):
+        return False
+    roll, pitch, yaw = (np.nanmax(np.abs(table[name]), initial=0.0) for name in EULER)
+    if roll <= 3.2 and pitch <= 1.6 and yaw <= 6.4:
+        return False
+    for name in EULER:
+        table[name] = np.radians(table[name])
+    return True
+
+
+def at_times(t_s: Array, R_eb: Array, times_s: Array) -> Array:
+    """Attitude `R_eb` of the times `t_s` at other times, on the shortest way, NaN where it is too far off."""
+    known = np.isfinite(R_eb).all(axis=(1, 2)) & np.isfinite(t_s)
+    found = np.full((len(times_s), 3, 3), np.nan)
+    t_s, first = np.unique(t_s[known], return_index=True)
+    if len(t_s) < 2:
+        return found
+    after = np.clip(np.searchsorted(t_s, times_s), 1, len(t_s) - 1)
+    inside = (times_s >= t_s[0]) & (times_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] <= LONGEST_GAP_S)
+    if inside.any():
+        found[inside] = Slerp(t_s, Rotation.from_matrix(R_eb[known][first]))(times_s[inside]).as_matrix()
+    return found

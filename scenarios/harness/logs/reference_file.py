@@ -1,0 +1,128 @@
+"""Attitudes in a file of their own, to score a log against: a table, a MATLAB file, a recording, another log.
+
+They pass through the same repairs as a log: units of time and angle, order, repeated times, rows without a number.
+Their times must be on the clock of the log; in another unit they are found out by comparing the two spans.
+"""
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import Array
+from estimator.screening import LONGEST_GAP_S
+from scenarios.harness.logs import accounts, attitudes, checks
+from scenarios.harness.logs.ledger import Ledger
+from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.tabular import Group
+
+_UNITS = ((1.0, "seconds"), (1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
+Kind = Literal["truth", "filter", "firmware"]
+
+
+def of_table(
+    path: Path, groups: list[Group], source: checks.Source, rows_s: Array, ledger: Ledger, repairs: list[str]
+) -> Array:
+    """The attitude in the columns of a file at the times `rows_s` of a log, shape (N, 3, 3), NaN where there is none.
+
+    groups : columns by our names in our units
+
+    Raises
+    ------
+    LogError      no time and attitude in it, a clock that runs back, or that of another log; one line
+    """
+    found = next((g for g in groups if attitudes.form_of(g.table) and g.has("time")), None)
+    R_eb = attitudes.attitude(found.table) if found else None
+    if found is None or R_eb is None:
+        raise LogError(f"{path}: no time and attitude in it (roll pitch yaw, qw qx qy qz, or r00 to r22)")
+    table = found.table
+    read, why = attitudes.reasons(table, R_eb)
+    t_s = table["time"]
+    known = np.flatnonzero(np.isfinite(R_eb).all(axis=(1, 2)))
+    if not len(known):
+        raise LogError(f"{path}: no attitude in any of its {len(t_s)} rows")
+    factor = _factor(t_s[known], rows_s, source, repairs)
+    t_s = factor * t_s
+    of_file = checks.Source(path, source.columns, lambda k: source.row(int(known[k])))
+    mended: list[str] = []
+    known = _in_order(t_s, known, source, mended)
+    keep = known[checks.kept(t_s[known], {"attitude": np.ones(len(known))}, of_file, mended)]
+    repairs += [f"{path.name}: {line}" for line in mended]
+    first, last = float(t_s[keep[0]]), float(t_s[keep[-1]])
+    if first > rows_s[-1] or last < rows_s[0]:
+        raise LogError(
+            f"{path}: its times, {first:.10g} to {last:.10g} s, do not overlap those of the log, {rows_s[0]:.10g} to "
+            f"{rows_s[-1]:.10g} s: put both on one clock"
+        )
+    elsewhere = np.ones(len(t_s), np.bool_)
+    elsewhere[keep] = False
+    outside = (t_s < rows_s[0] - LONGEST_GAP_S) | (t_s > rows_s[-1] + LONGEST_GAP_S)
+    why += [
+        (~np.isfinite(t_s), accounts.NO_TIME), (elsewhere, accounts.REPEATED), (outside, accounts.OUTSIDE),
+    ]  # fmt: skip
+    good = accounts.samples(ledger, "reference", read, why)
+    ledger.use("reference", int(good.sum()))
+    found_R_eb = attitudes.at_times(t_s[keep], R_eb[keep], rows_s)
+    if not np.isfinite(found_R_eb).any():
+        usual_s = float(np.median(np.diff(t_s[keep]))) if len(keep) > 1 else 0.0
+        raise LogError(
+            f"{path}: its {len(keep)} attitudes are {usual_s:.3g} s apart; they are interpolated where they are at "
+            f"most {LONGEST_GAP_S:g} s apart, and no row of the log lies there"
+        )
+    return found_R_eb
+
+
+def _in_order(t_s: Array, known: NDArray[np.intp], source: checks.Source, repairs: list[str]) -> NDArray[np.intp]:
+    """`known` in order of time, where no time is there twice: two flights in one file would share some."""
+    times = t_s[known]
+    late = int(np.sum(np.diff(times) < 0.0))
+    if not late or len(np.unique(times)) < len(times):
+        return known
+    repairs.append(f"{source.column('time')}: {late} out of order, sorted")
+    return np.asarray(known[np.argsort(times, kind="stable")])
+
+
+def _factor(t_s: Array, rows_s: Array, source: checks.Source, repairs: list[str]) -> float:
+    """Factor to seconds: 1 where the spans overlap or none else does better."""
+    t_s = t_s[np.isfinite(t_s)]
+    if not len(t_s):
+        raise source.refusal(None, "time", "no number in it")
+    step_s, length_s = float(np.median(np.diff(np.sort(t_s)))) if len(t_s) > 1 else 0.0, float(rows_s[-1] - rows_s[0])
+    for factor, name in _UNITS:
+        first, last = factor * float(t_s.min()), factor * float(t_s.max())
+        if min(last, rows_s[-1]) <= max(first, rows_s[0]):
+            continue
+        if factor == 1.0:
+            return factor
+        # Times of another clock may overlap in a unit that is not theirs: then they are far too dense and too short.
+        if factor * step_s > 1.0 / checks.FASTEST_HZ and last - first > 0.1 * length_s:
+            repairs.append(f"{source.path.name}: {source.column('time')} in {name}, not seconds: converted")
+            return factor
+    return 1.0
+
+
+def of_log(path: Path, other: RecordedLog, rows_s: Array, ledger: Ledger) -> tuple[Array, Kind]:
+    """The attitude of another log or recording at the times `rows_s`; LogError where it has none or at other times."""
+    if other.reference is None:
+        raise LogError(f"{path}: no attitude in it")
+    t_s, known = other.rows["t_s"], other.reference.known
+    if not known.any():
+        raise LogError(f"{path}: no attitude in it")
+    t_s, R_eb = t_s[known], other.reference.R_eb[known]
+    if t_s[0] > rows_s[-1] or t_s[-1] < rows_s[0]:
+        raise LogError(
+            f"{path}: its times, {t_s[0]:.10g} to {t_s[-1]:.10g} s, do not overlap those of the log, {rows_s[0]:.10g} "
+            f"to {rows_s[-1]:.10g} s: put both on one clock"
+        )
+    outside = (t_s < rows_s[0] - LONGEST_GAP_S) | (t_s > rows_s[-1] + LONGEST_GAP_S)
+    good = accounts.samples(ledger, "reference", np.ones(len(t_s), np.bool_), [(outside, accounts.OUTSIDE)])
+    ledger.use("reference", int(good.sum()))
+    if np.array_equal(t_s, rows_s):  # its own rows: nothing to interpolate
+        return R_eb, other.reference.kind
+    return attitudes.at_times(t_s, R_eb, rows_s), other.reference.kind
+
+
+def reference(R_eb: Array, kind: Kind, path: Path) -> Reference:
+    """The attitude of a file of its own, by the name of the file."""
+    return Reference(R_eb, "truth" if "_truth." in path.name else kind, path.name)

@@ -1,0 +1,321 @@
+"""Text files of numbers in columns, as loggers and spreadsheets write them: found out, not asked for.
+
+Recognised: packed files (.gz), UTF-8 with and without a byte-order mark, UTF-16, Latin-1; line ends of any system;
+commas, semicolons, tabs, bars, or blanks between the cells; decimal commas; remarks (# % //), among them a header
+that is one; a row of units below the header; quotation marks; a delimiter at the end of each line; cells without a
+value (empty, nan, null, -).  Times of day and dates become seconds.
+
+What can be read in two ways is refused, with the entry of a column map that decides.
+"""
+
+import csv
+import gzip
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from estimator.interface import Array
+from scenarios.harness.logs import units
+from scenarios.harness.logs.column_map import ColumnMap
+from scenarios.harness.logs.recorded import LogError
+
+DELIMITERS = (";", "\t", ",", "|")
+REMARKS = ("#", "%", "//")
+NOTHING = frozenset(
+    ("", "nan", "null", "-", "--", "na", "n/a", "none", "#n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan")
+)
+_SAMPLE = 50  # lines that are looked at
+_DAY_S = 86400.0
+_NO_TIME = "is no number, no time of day (12:34:56.78) and no date (2026-07-02T12:34:56.78)"
+_CLOCK = re.compile(r"(\d{1,2}):([0-5]\d)(?::([0-5]?\d(?:[.,]\d*)?))?")
+
+
+@dataclass(frozen=True, slots=True)
+class TextTable:
+    """The columns of a file by their names, those that are wanted, and where they are.
+
+    header : names of all columns      lines : number of the line of each row      units : column -> of a row of units
+    notes : what was found out that a person may want to check      cut : rows that were cut off at the end, 0 or 1
+    meanings : the map that was given, or made of the names
+    """
+
+    columns: dict[str, Array]
+    header: tuple[str, ...]
+    lines: list[int]
+    meanings: ColumnMap
+    notes: tuple[str, ...] = ()
+    cut: int = 0
+    units: dict[str, str] = field(default_factory=dict)
+
+
+def read(path: Path, how: ColumnMap) -> TextTable:
+    """The table in the file at `path`.
+
+    Raises
+    ------
+    LogError      one line with the file, the line and the column
+    """
+    lines = re.split(r"\r\n|\n|\r", _text(path))
+    at = [i for i in range(how.skip_lines, len(lines)) if lines[i].strip()]
+    remarks = [i for i in at if lines[i].lstrip().startswith(REMARKS)]
+    remark = set(remarks)
+    at = [i for i in at if i not in remark]
+    delimiter = how.delimiter or _delimiter(path, [lines[i] for i in at])
+    cells = _cells(path, [lines[i] for i in at], delimiter)
+    above = 0 if how.names else _above_header(cells)
+    cells, at = cells[above:], at[above:]
+    header, at, cells = _header(path, how, lines, (remarks, at), cells, delimiter)
+    header, cells = _trimmed(header, cells)
+    of_units = dict[str, str]()
+    if len(cells) > 1 and _is_row_of_units(cells[0]):
+        of_units = {name: unit.strip("()[] ") for name, unit in zip(header, cells[0], strict=False)}
+        cells, at = cells[1:], at[1:]
+    if not cells:
+        raise LogError(f"{path}: no row of numbers: a header and rows of numbers are needed")
+    meanings = how.of(header, of_units)
+    _check_names(path, header, meanings, at[0])
+    decimal = how.decimal or _decimal(path, cells)
+    notes, cut = [f"{above} lines above the header passed over"] if above else [], 0
+    if len(cells[-1]) < len(header) or (len(cells) > 1 and _cut_cell(cells[-1], cells[-2])):
+        notes.append(f"line {at[-1] + 1}, the last, was cut off: left out")
+        cells, at, cut = cells[:-1], at[:-1], 1
+    if not cells:
+        raise LogError(f"{path}: no row of numbers: a header and rows of numbers are needed")
+    _check_width(path, header, cells, at, delimiter)
+    of_time = [column for column, meaning in meanings.columns.items() if meaning.quantity == "time"]
+    columns = {}
+    for j, name in enumerate(header):
+        if name not in meanings.columns:
+            continue
+        column = [row[j] for row in cells]
+        if name in of_time and _is_clock(column):
+            columns[name], note = _clock(path, column, name, lambda k: f"line {at[k] + 1}")
+            notes.append(note)
+        else:
+            what = _NO_TIME if name in of_time else "is no number"
+            columns[name] = _numbers(path, column, (name, what), decimal, lambda k: f"line {at[k] + 1}")
+    return TextTable(columns, tuple(header), [i + 1 for i in at], meanings, tuple(notes), cut, of_units)
+
+
+def _text(path: Path) -> str:
+    """The text of a file, packed or not."""
+    try:
+        raw = path.read_bytes()
+        if raw[:2] == b"\x1f\x8b":
+            raw = gzip.decompress(raw)
+        if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            return raw.decode("utf-16")
+        if b"\0" in raw[:1000]:
+            raise LogError(f"{path}: cannot be read as text: there are zero bytes in it")
+        try:
+            return raw.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            return raw.decode("latin-1")
+    except (OSError, EOFError, UnicodeDecodeError, gzip.zlib.error) as error:  # type: ignore[attr-defined]
+        raise LogError(f"{path}: cannot be read: {error}") from error
+
+
+def _delimiter(path: Path, lines: Sequence[str]) -> str:
+    """What stands between the cells: the first that divides the rows alike."""
+    if not lines:
+        raise LogError(f"{path}: 0 lines; a header and rows of numbers are needed")
+    rows = lines[1:][-_SAMPLE:] or lines  # the last ones: above them there may be a page about the logger
+    for delimiter in DELIMITERS:
+        widths = [len(row) for row in csv.reader(rows, delimiter=delimiter)]
+        usual = max(set(widths), key=widths.count) if widths else 0
+        if usual >= 2 and 2 * widths.count(usual) > len(widths):
+            return delimiter
+    if all(len(line.split()) > 1 for line in rows):
+        return " "
+    shown = lines[0].strip()[:60]
+    raise LogError(f"{path}: no columns in it, the first line is {shown!r}: name the delimiter in a column map")
+
+
+def _cells(path: Path, lines: Sequence[str], delimiter: str) -> list[list[str]]:
+    if delimiter == " ":
+        lines = [re.sub(r"[ \t]+", " ", line.strip()) for line in lines]
+    cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=delimiter)]
+    if len(cells) != len(lines):
+        raise LogError(f"{path}: a quotation mark that opens and does not close")
+    return cells
+
+
+def _above_header(cells: list[list[str]]) -> int:
+    """How many lines stand above a header of names: those that have another number of cells than the rows."""
+    widths = [len(row) for row in cells[1:][-_SAMPLE:]]
+    usual = max(set(widths), key=widths.count) if widths else 0
+    for i, row in enumerate(cells[:-1]):
+        if len(row) == usual:
+            return i if i and not _is_numeric(row) else 0
+    return 0
+
+
+def _header(
+    path: Path,
+    how: ColumnMap,
+    lines: Sequence[str],
+    places: tuple[list[int], list[int]],
+    cells: list[list[str]],
+    delimiter: str,
+) -> tuple[list[str], list[int], list[list[str]]]:
+    """Names of the columns, and what remains below them: of the map, the first line, or a remark above the numbers."""
+    remarks, at = places
+    if how.names:
+        return list(how.names), at, cells
+    if cells and not _is_numeric(cells[0]):
+        if delimiter == " " and len(cells) > 1 and len(cells[0]) != len(cells[1]):  # names of several words
+            apart = re.split(r"\s{2,}|\t+", lines[at[0]].strip())
+            if len(apart) == len(cells[1]):
+                return apart, at[1:], cells[1:]
+        return cells[0], at[1:], cells[1:]
+    above = [i for i in remarks if not at or i < at[0]]
+    for i in reversed(above):
+        bare = lines[i].lstrip().lstrip("#%/ \t")
+        found = _cells(path, [bare], delimiter)[0] if bare else []
+        if cells and len(found) == len(cells[0]) and not _is_numeric(found):
+            return found, at, cells
+    if not cells:
+        raise LogError(f"{path}: 0 lines; a header and rows of numbers are needed")
+    raise LogError(
+        f"{path}: line {at[0] + 1} holds numbers and there is no header: write the names of its {len(cells[0])} "
+        'columns in a line above, or in a column map as names = ["t", "gx", ...]'
+    )
+
+
+def _trimmed(header: list[str], cells: list[list[str]]) -> tuple[list[str], list[list[str]]]:
+    """Without the empty cell that a delimiter at the end of a line makes."""
+    header = list(header)
+    while header and not header[-1] and all(len(row) < len(header) or not row[-1] for row in cells):
+        header.pop()
+    n = len(header)
+    cells = [row[:n] if len(row) > n and not any(row[n:]) else row for row in cells]
+    return [name or f"column {j + 1}" for j, name in enumerate(header)], cells
+
+
+def _is_row_of_units(row: Sequence[str]) -> bool:
+    """Whether no cell is a number, and most are units."""
+    bare = [cell.strip("()[] ") for cell in row]
+    said = [cell for cell in bare if cell not in ("", "-")]
+    known = sum(units.is_unit(cell) for cell in said)
+    return bool(said) and not any(_is_number(cell) for cell in said) and 2 * known >= len(said)
+
+
+def _check_names(path: Path, header: Sequence[str], meanings: ColumnMap, first: int) -> None:
+    """A name that is wanted must be there once."""
+    for name in meanings.columns:
+        if list(header).count(name) > 1:
+            raise LogError(f"{path}: line {first}: two columns are named {name!r}")
+
+
+def _check_width(path: Path, header: Sequence[str], cells: list[list[str]], at: list[int], delimiter: str) -> None:
+    for i, row in zip(at, cells, strict=True):
+        if len(row) == len(header):
+            continue
+        hint = ""
+        if delimiter == "," and len(row) > len(header) and all(re.fullmatch(r"[-+]?\d+", cell) for cell in row if cell):
+            hint = ": decimal commas between commas cannot be told apart; export it with semicolons or decimal points"
+        raise LogError(f"{path}: line {i + 1}: {len(row)} cells; the header has {len(header)}{hint}")
+
+
+def _decimal(path: Path, cells: list[list[str]]) -> str:
+    """The decimal sign of the first lines; LogError where both occur."""
+    seen = [cell for row in cells[:_SAMPLE] for cell in row]
+    commas = [cell for cell in seen if re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", cell)]
+    points = [cell for cell in seen if re.fullmatch(r"[-+]?\d*\.\d+([eE][-+]?\d+)?", cell)]
+    if commas and points:
+        raise LogError(
+            f"{path}: {commas[0]!r} and {points[0]!r} are both in it: say in a column map which is the decimal sign, "
+            'decimal = "," or decimal = "."'
+        )
+    return "," if commas else "."
+
+
+def _numbers(path: Path, column: list[str], name: tuple[str, str], decimal: str, where: Callable[[int], str]) -> Array:
+    """The numbers of a column, NaN where there is none; LogError with line and column elsewhere.
+
+    name : of the column, and what to say of a cell that holds something else
+    """
+    if decimal == ",":
+        column = [cell.replace(".", "").replace(",", ".") for cell in column]
+    try:
+        return np.array([float(cell) if cell else np.nan for cell in column])
+    except ValueError:
+        pass
+    values = np.full(len(column), np.nan)
+    for k, cell in enumerate(column):
+        if cell.lower() in NOTHING:
+            continue
+        try:
+            values[k] = float(re.sub(r"(?<=\d)[dD](?=[-+]?\d)", "e", cell))  # Fortran's 1.0D-03
+        except ValueError:
+            raise LogError(f"{path}: {where(k)}, column {name[0]}: {cell!r} {name[1]}") from None
+    return values
+
+
+def _is_clock(column: Sequence[str]) -> bool:
+    """Whether the first cell that is not empty is a date or a time of day."""
+    first = next((cell for cell in column if cell.lower() not in NOTHING), "")
+    return not _is_number(first) and (_CLOCK.fullmatch(first) is not None or _date(first) is not None)
+
+
+def _date(cell: str) -> datetime | None:
+    """A date and time, of UTC where no zone is said."""
+    cell = re.sub(r"(\.\d{6})\d+", r"\1", cell.replace(",", "."))  # nanoseconds
+    for old in ("", "/"):
+        try:
+            found = datetime.fromisoformat(cell.replace(old, "-") if old else cell)
+        except ValueError:
+            continue
+        return found if found.tzinfo else found.replace(tzinfo=UTC)
+    return None
+
+
+def _clock(path: Path, column: Sequence[str], name: str, where: Callable[[int], str]) -> tuple[Array, str]:
+    """Dates as seconds since 1970, times of day as seconds since the first midnight; and what to say of it."""
+    t_s, day = np.full(len(column), np.nan), 0.0
+    of_day = next((_CLOCK.fullmatch(cell) is not None for cell in column if cell.lower() not in NOTHING), False)
+    latest = -np.inf
+    for k, cell in enumerate(column):
+        if cell.lower() in NOTHING:
+            continue
+        match, date = _CLOCK.fullmatch(cell), None if of_day else _date(cell)
+        if of_day and match:
+            second = float((match[3] or "0").replace(",", "."))
+            now = 3600.0 * int(match[1]) + 60.0 * int(match[2]) + second + day
+            if now < latest - 0.5 * _DAY_S:  # past midnight
+                day += _DAY_S
+                now += _DAY_S
+            t_s[k] = latest = now
+        elif date is not None:
+            t_s[k] = date.timestamp()
+        else:
+            what = "time of day" if of_day else "date and time"
+            raise LogError(f"{path}: {where(k)}, column {name}: {cell!r} is no {what} like those above it")
+    since = "midnight" if of_day else "1970"
+    return t_s, f"column {name} holds {'times of day' if of_day else 'dates'}: seconds since {since}"
+
+
+def _is_number(cell: str) -> bool:
+    """Whether the cell holds a number, or nothing."""
+    if cell.lower() in NOTHING:
+        return True
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _is_numeric(row: Sequence[str]) -> bool:
+    """Whether a row holds numbers and no name."""
+    return all(_is_number(cell) for cell in row) and any(cell.lower() not in NOTHING for cell in row)
+
+
+def _cut_cell(row: list[str], before: list[str]) -> bool:
+    """Whether the last cell of `row` is the beginning of a number, as in "-" or "1e", below a whole one."""
+    beginning = row[-1] == "-" or not _is_number(row[-1])
+    return beginning and before[-1].lower() not in NOTHING and _is_number(before[-1])
