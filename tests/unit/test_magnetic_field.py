@@ -102,7 +102,7 @@ def test_declination_is_the_angle_of_the_field_from_true_north(year):
 
 
 def test_declination_of_older_years_is_by_the_model_of_its_time():
-    """It moves on within each and does not jump between them; before the first one it is that of the first; off the earth it is none."""
+    """It moves on within each model and does not jump between them; before the first it stays."""
     years = [2010.0, 2014.9, 2015.1, 2019.9, 2020.1, 2024.9, 2025.1]
     found = np.degrees([declination_rad(42.8, -73.95, 100.0, year) for year in years])
     assert np.all(np.diff(found)[0::2] > 0.1)  # to the east, within each
