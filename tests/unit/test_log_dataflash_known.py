@@ -159,7 +159,7 @@ def test_compass_that_the_firmware_does_not_use_is_not_given(logged, known):
         assert log.known["use_magnetometer"] == Known(False, "log", reason.split()[0])
 
 
-def test_vertical_velocity_is_known_to_be_there_or_not(dataflash, known):
+def test_vertical_velocity_is_known_to_be_there_or_not(logged, dataflash, known):
     """Without a column, always zero while the height changes, or by the receiver's own flag; it reads 0 then."""
     gps = dataflash.TODAY["GPS"]
     lacking = {
@@ -168,8 +168,13 @@ def test_vertical_velocity_is_known_to_be_there_or_not(dataflash, known):
     short = known(formats=lacking, change=lambda m: m if m[1] != "GPS" else (m[0], "GPS", m[2][:12]))
     zero = known(change=lambda m: m if m[1] != "GPS" else (m[0], "GPS", (*m[2][:12], 0.0, 0.0)))
     flag = known(more=[(m[0], "GPA", (m[0], 0, 1, 1, 1, 1, 0.0, 0, 0, 200)) for m in [(30_500_000,)]])
+    stray = known(
+        change=lambda m: (
+            m if m[1] != "GPS" else (m[0], "GPS", (*m[2][:12], 30.0 if m[0] == logged.fix_us[50] else 0.0, 0.0))
+        )
+    )
     nothing = known(change=lambda m: m if m[1] != "GPS" else (m[0], "GPS", (*m[2][:12], math.nan, 0.0)))
-    for log, origin in ((short, "GPS has no VZ"), (zero, "GPS"), (flag, "GPA.VV"), (nothing, "GPS.VZ")):
+    for log, origin in ((short, "GPS has no VZ"), (zero, "GPS"), (stray, "GPS"), (flag, "GPA.VV"), (nothing, "GPS.VZ")):
         assert log.known["gps_vertical_velocity"] == Known(False, "log", origin)
         assert not log.rows["gps_v_e_m_s"][:, 2].any()
         assert log.rows["gps_new"].sum() > 90

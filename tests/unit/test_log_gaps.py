@@ -58,6 +58,14 @@ def test_samples_lost_are_counted_through_the_jitter():
     assert line.startswith(f"{len(lost)} samples lost, the next stands for them; first at ")
 
 
+def test_late_stamp_near_a_gap_is_no_second_one():
+    """Three samples lost, and seven samples on one that is stamped 12 ms late and made good by the next."""
+    t_s = DT_S * np.arange(403.0)
+    t_s[210] += 0.012
+    t_s = np.delete(t_s, [200, 201, 202])
+    assert np.flatnonzero(missing(t_s, np.full(400, DT_S))).tolist() == [200]
+
+
 def test_gap_longer_than_half_a_second_is_one_whatever_follows():
     """A stamp that is 0.6 s late and made good by the next ones is not believed."""
     t_s = DT_S * np.arange(400.0)

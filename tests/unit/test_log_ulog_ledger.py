@@ -74,6 +74,20 @@ def test_data_appended_after_a_crash_are_found_where_the_flags_say(logged, px4, 
     assert len(log.rows) == 1000
 
 
+def test_message_that_was_cut_off_by_a_crash_does_not_take_appended_data_for_its_end(logged, px4, pieces, read_back):
+    """Though what was appended ends where it would have ended, and another message follows there."""
+    records = pieces()
+    last = max(k for k, record in enumerate(records) if len(record) == 50)  # of sensor_combined
+    cut = records[last][:20]
+    text = px4.framed("L", b"6" + bytes(8) + b"hardfault, reset..")
+    assert len(cut) + len(text) == len(records[last])
+    begin = sum(map(len, records[:last])) + len(cut)
+    records[0] = appended(records[0], [begin])
+    log = read_back([*records[:last], cut, text, *records[last + 1 :]], "flight.ulg")
+    np.testing.assert_allclose(log.rows["gyro_b_rad_s"], logged.rate[:999], rtol=0, atol=1e-7)
+    assert log.repairs == (f"20 bytes that are no whole message left out, first at byte {begin - 20}",)
+
+
 def test_flags_that_point_nowhere_do_no_harm(pieces, read_back):
     """Damaged places: behind the end, and into the middle of a message."""
     records = pieces()

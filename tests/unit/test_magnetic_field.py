@@ -10,7 +10,7 @@ import ppigrf
 import pytest
 
 from sim import place
-from sim.magnetic_field import field_e_ut
+from sim.magnetic_field import declination_rad, field_e_ut
 
 PLACES = {
     "launch point": (place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M),
@@ -92,3 +92,21 @@ def test_importing_the_sensor_does_not_load_the_model():
     """A flight without a magnetometer pays nothing for it."""
     told = "import sys, sim.magnetic_field; sys.exit('pygeomag' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", told], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("year", [2025.0, 2027.3, 2030.0])
+def test_declination_is_the_angle_of_the_field_from_true_north(year):
+    """Within the years of the newest model."""
+    north, east, _ = field_e_ut(42.8, -73.95, 100.0, year)
+    assert declination_rad(42.8, -73.95, 100.0, year) == pytest.approx(np.arctan2(east, north), rel=0, abs=1e-6)
+
+
+def test_declination_of_older_years_is_by_the_model_of_its_time():
+    """It moves on within each model and does not jump between them; before the first it stays."""
+    years = [2010.0, 2014.9, 2015.1, 2019.9, 2020.1, 2024.9, 2025.1]
+    found = np.degrees([declination_rad(42.8, -73.95, 100.0, year) for year in years])
+    assert np.all(np.diff(found)[0::2] > 0.1)  # to the east, within each
+    assert np.all(np.abs(np.diff(found)[1::2]) < 0.1)  # from one model to the next
+    assert declination_rad(42.8, -73.95, 100.0, 1999.0) == declination_rad(42.8, -73.95, 100.0, 2010.0)
+    with pytest.raises(ValueError, match=r"latitude 91\.0, longitude 0\.0 deg: choose a place on earth"):
+        declination_rad(91.0, 0.0, 0.0, 2026.0)
