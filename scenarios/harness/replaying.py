@@ -59,7 +59,7 @@ class Told:
             "ledger": self.log.ledger.to_json(),
             "judged_s": self.judged_s,
             "not_judged": self.not_judged or None,
-            "notes": list(self.notes),
+            "notes": [*self.log.notes, *self.notes],
         }
         each = {r.estimator: r.to_json() | {"recording": str(self.folders[r.estimator])} for r in self.replays}
         alone = next(iter(each.values())) if len(each) == 1 else {}
@@ -121,6 +121,8 @@ def tell(told: Told) -> None:
     out, log = console.out(), told.log
     length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
     out.print(Text(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}"), soft_wrap=True)
+    for line in log.notes:
+        out.print(Text(f"note        {line}"), soft_wrap=True)
     for line in log.repairs:
         out.print(Text(f"repaired    {line}", "yellow"), soft_wrap=True)
     for line in told.notes:

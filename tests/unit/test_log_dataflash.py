@@ -122,7 +122,7 @@ def test_log_is_read_as_it_was_written(logged, demand_same_rows, write):
     log = write(Writer(TODAY).log(messages(logged)))
     demand_same_rows(log.rows, logged.expected(stamped=False), RESOLUTION)
     assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
-    assert log.repairs == (ONE_READ,)
+    assert (log.repairs, log.notes) == ((), (ONE_READ,))
     assert log.place == pytest.approx((47.4, 8.5), rel=0, abs=1e-7)
     assert log.reference is not None
     assert (log.reference.kind, log.reference.name) == ("truth", "SIM in flight.BIN")
@@ -195,7 +195,7 @@ def test_units_are_those_that_the_log_tells(logged, demand_same_rows, write):
         told.append((t, name, scaled))
     log = write(Writer(formats).log(told))
     demand_same_rows(log.rows, logged.expected(stamped=False), RESOLUTION | {"mag_b_ut": 5e-6})
-    assert log.repairs == (ONE_READ,)
+    assert (log.repairs, log.notes) == ((), (ONE_READ,))
 
 
 def test_inertial_unit_is_chosen_by_its_number(logged, write):
@@ -296,7 +296,6 @@ def test_damaged_times_are_left_out_and_late_ones_sorted(logged, demand_same_row
     told[index[500]] = (told[index[500]][0], "IMU", (*told[index[500]][2][:4], np.nan, *told[index[500]][2][5:]))
     log = write(Writer(TODAY).log(told))
     assert log.repairs[:5] == (
-        ONE_READ,
         "IMU: 1 at a time far from its neighbours left out, first 201",
         "column GyrZ (gyro.z): 1 without a number left out, first IMU 502",
         "column IMU time (time): 1 out of order, sorted; first IMU 302",
@@ -315,7 +314,7 @@ def test_messages_that_were_logged_late_arrive_in_order(logged, demand_same_rows
     told[a], told[b] = (told[a][0], "GPS", told[b][2]), (told[b][0], "GPS", told[a][2])
     log = write(Writer(TODAY).log(told))
     demand_same_rows(log.rows, logged.expected(stamped=False), RESOLUTION)
-    assert log.repairs == (ONE_READ, "GPS: 1 out of order, sorted")
+    assert log.repairs == ("GPS: 1 out of order, sorted",)
 
 
 def test_definition_before_damaged_bytes_is_kept(logged, demand_same_rows, write):
@@ -323,7 +322,7 @@ def test_definition_before_damaged_bytes_is_kept(logged, demand_same_rows, write
     records = Writer(TODAY, told=False).log(messages(logged))
     log = write([records[0], bytes(9), *records[1:]])
     demand_same_rows(log.rows, logged.expected(stamped=False), RESOLUTION)
-    assert log.repairs == (f"9 bytes that are no whole record left out, first at byte {len(records[0])}", ONE_READ)
+    assert log.repairs == (f"9 bytes that are no whole record left out, first at byte {len(records[0])}",)
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -43,7 +43,7 @@ def test_good_log_is_used_whole(logged, read):
         "imu": (1000, 1000, {}), "gps": (fixes, fixes, {}), "magnetometer": (fields, fields, {}),
         "airspeed": (airs, airs, {}), "barometer": (airs, airs, {}), "reference": (1000, 1000, {}),
     }  # fmt: skip
-    assert log.repairs == ("only one of several instances is read: IMU 0 (of 0, 1); GPS 0 (of 0, 1)",)
+    assert log.notes == ("only one of several instances is read: IMU 0 (of 0, 1); GPS 0 (of 0, 1)",)
 
 
 def test_each_reason_is_counted_by_itself(logged, read):

@@ -5,6 +5,7 @@ MAG holds the field after the firmware's corrections, with the offsets that it a
 RATE are those of the controller, filtered and corrected, and not what the gyro measured: not used.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,7 @@ def of_messages(records: DataFlash | MatlabMessages, imu: int | None = None) -> 
     airspeed, pitot = log.airspeed()
     height = log.stream("BARO", ("Alt",), HEALTHY[2])
     attitude = log.attitude()
-    if log.others:
-        log.repairs.append(f"only one of several instances is read: {'; '.join(log.others)}")
+    notes = (f"only one of several instances is read: {'; '.join(log.others)}",) if log.others else ()
     messages = streams.Messages(
         inertial,
         np.full(len(inertial.t_s), np.nan),
@@ -65,7 +65,7 @@ def of_messages(records: DataFlash | MatlabMessages, imu: int | None = None) -> 
         {**receiver, **compass, **pitot},
         log.parameters.log_imu(),
     )
-    return streams.recorded(log.path, messages, log.repairs)
+    return replace(streams.recorded(log.path, messages, log.repairs), notes=notes)
 
 
 class _Log:

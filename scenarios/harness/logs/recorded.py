@@ -45,6 +45,7 @@ class RecordedLog:
     known : what the log says of the instruments aboard, by the names of `estimator.instruments.PROPERTIES`, and of
             parameters that single estimators have
     ledger : what became of everything that the file holds
+    notes : what else is worth saying of it, a line each
     """
 
     rows: NDArray[Any]
@@ -55,3 +56,4 @@ class RecordedLog:
     place: tuple[float, float] | None = None
     known: Mapping[str, Known] = field(default_factory=dict)
     ledger: Ledger = field(default_factory=Ledger)
+    notes: tuple[str, ...] = ()

@@ -58,13 +58,12 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     airspeed, pitot = _switched(log, "airspeed", _airspeed(log))
     height = _height(log)
     attitude = _attitude(log)
-    if log.others:
-        repairs.append(f"only one of several instances is read: {'; '.join(log.others)}")
+    notes = (f"only one of several instances is read: {'; '.join(log.others)}",) if log.others else ()
     messages = streams.Messages(
         inertial, dt_s, names, fixes, field, airspeed, height, *attitude,
         {**receiver, **compass, **pitot}, px4.LOG_FASTER,
     )  # fmt: skip
-    return streams.recorded(path, messages, repairs)
+    return replace(streams.recorded(path, messages, repairs), notes=notes)
 
 
 class _Log:
