@@ -150,7 +150,7 @@ def test_compass_that_the_firmware_does_not_use_is_not_given(logged, known):
     second = [(t, "MAG", (t, 1, *(5.0 * b), 1)) for t, b in zip(logged.field_us, logged.field, strict=True)]
     log = known({"COMPASS_USE": 0, "COMPASS_USE2": 1}, more=second)
     np.testing.assert_allclose(log.rows["mag_b_ut"][-1], 0.5 * logged.field[-1], rtol=0, atol=0.051)
-    assert any("MAG 1 (of 0, 1)" in line for line in log.repairs)
+    assert any("MAG 1 (of 0, 1)" in line for line in log.notes)
     for off in ({"COMPASS_USE": 0, "COMPASS_USE2": 0}, {"COMPASS_ENABLE": 0, "COMPASS_USE": 1}):
         log = known(off, more=second)
         assert "magnetometer" not in log.instruments
@@ -194,6 +194,6 @@ def test_receiver_that_was_used_most_is_read(logged, known):
         return m[0], "GPS", (*fix, m[2][1])
 
     log = known(formats=used, change=second_is_used)
-    assert any("GPS 1 (of 0, 1)" in line for line in log.repairs)
+    assert any("GPS 1 (of 0, 1)" in line for line in log.notes)
     expected = 1.1 * np.hypot(*logged.v_e[-1, :2])
     assert log.rows["gps_speed_m_s"][-1] == pytest.approx(expected, rel=1e-6)
