@@ -41,14 +41,16 @@ from estimator.compiled import BELIEF, WIND, Compiled, write_estimate, write_win
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.kernels import clip, wrap
+from estimator.magnetometer import believable
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate
+from estimator.rotation import renormalise_exactly as renormalise_exactly
 from estimator.screening import (
-    AIR,
     FORCE_GOOD,
     G_M_S2,
     GPS,
     MAG,
     SCREEN,
+    airspeed_came,
     attitude_at_rest,
     offset_at_rest,
     refuse,
@@ -71,13 +73,14 @@ CLIP_G = 0.5
 FIX_LIFE_S, FIELD_LIFE_S = 2.0, 0.5  # an older sample is none
 
 _OF_SCREEN = ("gyro_range_rad_s", "force_range_m_s2")
-_SETTINGS = tuple(f for f in fields(ApDcmParams) if f.name != "quirks")
+_SETTINGS = tuple(f for f in fields(ApDcmParams) if f.name not in ("quirks", "use_magnetometer"))
 _PARAMS = (
     *(
         Column(f.name, (), "see ApDcmParams", integer=isinstance(f.default, int))
         for f in _SETTINGS
         if f.name not in _OF_SCREEN
     ),
+    Column("use_magnetometer", (), "1 where its samples are taken", integer=True),
     *(Column(quirk.value, (), "see Quirk", integer=True) for quirk in Quirk),
 )
 _STATE = (
@@ -127,27 +130,6 @@ STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + _PARAMS + _STATE)
 
 
 @kernel
-def renormalise_exactly(R_eb):  # type: ignore[no-untyped-def]
-    """Bring the matrix back to a rotation, in place, each row by its exact length (Eqns 2.4-2.6); False if hopeless."""
-    error = R_eb[0, 0] * R_eb[1, 0] + R_eb[0, 1] * R_eb[1, 1] + R_eb[0, 2] * R_eb[1, 2]
-    for j in range(3):
-        x, y = R_eb[0, j], R_eb[1, j]
-        R_eb[0, j] = x - 0.5 * error * y  # Eqn 2.4
-        R_eb[1, j] = y - 0.5 * error * x
-    R_eb[2, 0] = R_eb[0, 1] * R_eb[1, 2] - R_eb[0, 2] * R_eb[1, 1]  # Eqn 2.5
-    R_eb[2, 1] = R_eb[0, 2] * R_eb[1, 0] - R_eb[0, 0] * R_eb[1, 2]
-    R_eb[2, 2] = R_eb[0, 0] * R_eb[1, 1] - R_eb[0, 1] * R_eb[1, 0]
-    for i in range(3):
-        length = np.sqrt(R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2)
-        if not 1e-6 < length < 1e6:
-            return False
-        scale = 1.0 / length
-        for j in range(3):
-            R_eb[i, j] *= scale  # Eqn 2.6
-    return True
-
-
-@kernel
 def take_arrivals(row, s):  # type: ignore[no-untyped-def]
     """Take what arrived of GPS, magnetometer and airspeed, if it can be believed."""
     s.fix_age_s += s.dt_s
@@ -156,24 +138,21 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
     s.new_fix = 0
     if row.gps_new:
         v, course, speed = row.gps_v_e_m_s, row.gps_course_rad, row.gps_speed_m_s
-        if max(abs(v[0]), abs(v[1]), abs(v[2])) < 1000.0 and abs(course) < 100.0 and 0.0 <= speed < 1000.0:
+        moving = abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0  # NaN is not
+        if moving and abs(course) < 100.0 and 0.0 <= speed < 1000.0:
             s.new_fix, s.new_course, s.fix_age_s, s.course_rad, s.speed_m_s = 1, 1, 0.0, course, speed
             s.course[0], s.course[1] = np.cos(course), np.sin(course)
         else:
             refuse(s, GPS)
-    if row.mag_new and s.use_compass:
-        m = row.mag_b_ut
-        if 0.0 < m[0] * m[0] + m[1] * m[1] + m[2] * m[2] < 1e8:
+    if row.mag_new and s.use_magnetometer:
+        if believable(row.mag_b_ut, s.field_range_ut):
             s.new_field, s.field_age_s = 1, 0.0
             for i in range(3):
-                s.field_b_ut[i] = m[i]
+                s.field_b_ut[i] = row.mag_b_ut[i]
         else:
             refuse(s, MAG)
-    if row.air_new:
-        if abs(row.airspeed_m_s) < 1000.0:  # a pitot tube at rest reads a little below zero
-            s.airspeed_m_s, s.air_age_s = max(row.airspeed_m_s, 0.0), 0.0
-        else:
-            refuse(s, AIR)
+    if airspeed_came(row, s):
+        s.airspeed_m_s, s.air_age_s = max(row.airspeed_m_s, 0.0), 0.0
 
 
 @kernel
@@ -247,11 +226,11 @@ def compass_error(s):  # type: ignore[no-untyped-def]
     m = s.field_b_ut
     north = s.R_eb[0, 0] * m[0] + s.R_eb[0, 1] * m[1] + s.R_eb[0, 2] * m[2]  # Eqn 3.1
     east = s.R_eb[1, 0] * m[0] + s.R_eb[1, 1] * m[1] + s.R_eb[1, 2] * m[2]
-    if not s.yaw_found:
-        set_heading(s, _yaw(s.R_eb) + s.declination_rad - np.arctan2(east, north))
-        return 0.0
     length = np.sqrt(north * north + east * east)
     if length < 1e-9:  # it points straight down: no direction
+        return 0.0
+    if not s.yaw_found:
+        set_heading(s, _yaw(s.R_eb) + s.declination_rad - np.arctan2(east, north))
         return 0.0
     return (north * np.sin(s.declination_rad) - east * np.cos(s.declination_rad)) / length  # Eqn 3.2
 
@@ -472,7 +451,7 @@ class ApDcm(Compiled):
     params : settings and quirks
     """
 
-    heading_reference: HeadingReference = "course"
+    heading_reference: HeadingReference = "course"  # "nose" where a magnetometer is known to be fitted
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     _step: ClassVar[Any] = staticmethod(step)
     _replay: ClassVar[Any] = staticmethod(_replay)
@@ -481,6 +460,8 @@ class ApDcm(Compiled):
     def __init__(self, params: ApDcmParams | None = None) -> None:
         super().__init__(STATE_DTYPE)
         self.params = params or self._default
+        if self.params.use_magnetometer:
+            self.heading_reference = "nose"
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:
@@ -492,6 +473,8 @@ class ApDcm(Compiled):
         self._state.fill(0)
         for f in _SETTINGS:
             s[f.name] = getattr(self.params, f.name)
+        use = self.params.use_magnetometer
+        s["use_magnetometer"] = use is None or bool(use)
         for quirk in self.params.quirks:
             s[Quirk(quirk).value] = 1
         s["R_eb"] = s["R_euler_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)

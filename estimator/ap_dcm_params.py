@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+from estimator.magnetometer import FIELD_RANGE_UT
 from estimator.screening import FORCE_RANGE_M_S2, GYRO_RANGE_RAD_S
 
 MOST_FIXES = 5
@@ -51,11 +52,13 @@ class ApDcmParams:
     gps_gain : float            share of the GPS acceleration that is believed, 0..1; AHRS_GPS_GAIN
     gps_delay_fixes : int       fixes by which the GPS velocity is late, 0..5: the specific force is compared that
                                 much later (AHRS_GPS_DELAY, November 2013; its default there was 2)
-    use_compass : bool          take the magnetometer for yaw when it arrives; else, or without one, the course
+    use_magnetometer : bool or None   take the magnetometer for yaw when it arrives; else the course.  True: one is
+                                fitted and calibrated, and the heading is that of the nose.  None: nobody knows, and
+                                it is taken if it comes
     declination_rad : float     of the magnetic field, east positive
     fly_forward : bool          an aeroplane: its course may stand for its heading, its airspeed for its motion
     estimate_wind : bool        learn the wind from turns, and from airspeed where there is a sensor
-    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
+    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
     """
 
     quirks: frozenset[Quirk] = frozenset()
@@ -66,12 +69,13 @@ class ApDcmParams:
     gyro_drift_rad_s2: float = math.radians(0.5 / 60.0)
     gps_gain: float = 1.0
     gps_delay_fixes: int = 0
-    use_compass: bool = True
+    use_magnetometer: bool | None = None
     declination_rad: float = 0.0
     fly_forward: bool = True
     estimate_wind: bool = True
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S
     force_range_m_s2: float = FORCE_RANGE_M_S2
+    field_range_ut: float = FIELD_RANGE_UT
 
     def __post_init__(self) -> None:
         if isinstance(self.quirks, str):  # as it is typed: --set quirks=vertical_clip,stuck_p_gain
@@ -89,6 +93,6 @@ class ApDcmParams:
             raise ValueError(f"gps_delay_fixes is {self.gps_delay_fixes}; it must be a whole number, 0 to {MOST_FIXES}")
         if not abs(self.declination_rad) <= math.pi:
             raise ValueError(f"declination_rad is {self.declination_rad} rad; it must be -pi to pi")
-        for name in ("gyro_range_rad_s", "force_range_m_s2"):
+        for name in ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut"):
             if not 0.0 < getattr(self, name) <= 1e4:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be more than zero, 10000 at most")

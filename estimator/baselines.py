@@ -18,7 +18,6 @@ from estimator.interface import Column, HeadingReference, ImuSample, Instrument,
 from estimator.jit import kernel
 from estimator.rotation import integrate, level, renormalise
 from estimator.screening import (
-    ALL_GOOD,
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     GYRO_RANGE_RAD_S,
@@ -26,6 +25,7 @@ from estimator.screening import (
     attitude_at_rest,
     offset_at_rest,
     screen,
+    screen_gyro,
     take_rate,
 )
 
@@ -59,13 +59,13 @@ def lean_on_force(R_eb, f):  # type: ignore[no-untyped-def]
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One sample: integrate the gyros, and lean on the accelerometer where asked; returns the `Health`."""
     row, s = rows[k], state[0]
-    good = screen(row, s)
+    good = screen(row, s) if s.tilt_from_force else screen_gyro(row, s)
     if good:
         take_rate(row, s, good)
         integrate(s.R_eb, s.omega_b_rad_s, s.dt_s)
-        if s.tilt_from_force and good & FORCE_GOOD:
+        if good & FORCE_GOOD:
             lean_on_force(s.R_eb, row.force_b_m_s2)
-    return 1 if good == ALL_GOOD else 2  # Health.GOOD, Health.POOR
+    return 2 if s.spoilt else 1  # Health.POOR, Health.GOOD
 
 
 @kernel

@@ -59,7 +59,7 @@ from estimator.compiled import BELIEF, Compiled, write_estimate
 from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.kernels import wrap
-from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
+from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field, turn_to_north
 from estimator.pi import corrected_rate, feed_back, weigh
 from estimator.rotation import integrate
 from estimator.screening import (
@@ -178,23 +178,18 @@ def heading_of_field(m, f):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def set_heading(R_eb, heading_rad):  # type: ignore[no-untyped-def]
-    """Turn the matrix about the vertical, in place, until this heading is square to the wings, as Eqn 7's is."""
-    by = heading_rad - np.arctan2(-R_eb[0, 1], R_eb[1, 1])
-    c, z = np.cos(by), np.sin(by)
-    for j in range(3):
-        x, y = R_eb[0, j], R_eb[1, j]
-        R_eb[0, j], R_eb[1, j] = c * x - z * y, z * x + c * y
-
-
-@kernel
 def take_heading(row, s, good):  # type: ignore[no-untyped-def]
-    """Every 125 ms, see how far the yaw has drifted from the magnetometer's heading; the first one sets it."""
+    """Every 125 ms, see how far the yaw has drifted from the magnetometer's heading; the first field sets it.
+
+    What sets it is compensated with the tilt of the matrix: a single sample of the accelerometer vibrates.
+    """
     s.heading_age_s += s.dt_s
     s.heading_due_s = min(s.heading_due_s + s.dt_s, 2.0 * s.yaw_every_s)
     if s.heading_age_s > HEADING_LIFE_S:
         s.drift = 0.0
     came = take_field(row, s)
+    if came and not s.aligned and turn_to_north(s.R_eb, s.field_b_ut, s.declination_rad):
+        s.aligned = 1
     if not (came and good & FORCE_GOOD and s.heading_due_s >= s.yaw_every_s):
         return
     heading = heading_of_field(s.field_b_ut, row.force_b_m_s2) + s.declination_rad
@@ -203,9 +198,6 @@ def take_heading(row, s, good):  # type: ignore[no-untyped-def]
     s.heading_due_s -= s.yaw_every_s
     s.heading_age_s, s.heading_rad = 0.0, heading
     heading += s.correction_rad
-    if not s.aligned:
-        s.aligned = 1
-        set_heading(s.R_eb, heading)
     hx, hy = np.cos(heading), np.sin(heading)
     x, y = s.R_eb[1, 1], -s.R_eb[0, 1]  # square to the wings
     s.drift = x * hy - y * hx  # Premerlani's Eqn 23
@@ -224,7 +216,7 @@ def take_course(row, s):  # type: ignore[no-untyped-def]
     if not row.gps_new:
         return
     x, y = row.gps_p_e_m[0], row.gps_p_e_m[1]
-    if not (abs(x) < 1e6 and abs(y) < 1e6):
+    if not (abs(x) < 1e6 and abs(y) < 1e6 and 0.0 <= row.gps_speed_m_s < 1000.0):
         refuse(s, GPS)
         return
     first_s, second_s = s.p_age_s[1] - s.p_age_s[0], s.p_age_s[0]
@@ -236,7 +228,7 @@ def take_course(row, s):  # type: ignore[no-untyped-def]
     s.p_e_m[0, 0], s.p_e_m[0, 1], s.p_age_s[0] = x, y, 0.0
     straight = abs(s.turned_rad) <= STRAIGHT_RAD and s.heading_age_s <= HEADING_LIFE_S
     # Positions 0.2 s apart that are 0.3 m wrong make 1 m/s out of nothing; the receiver's own speed does not.
-    moving = s.min_speed_m_s <= row.gps_speed_m_s <= FASTEST_M_S and np.hypot(vx, vy) <= FASTEST_M_S  # NaN is not
+    moving = s.min_speed_m_s <= row.gps_speed_m_s <= FASTEST_M_S and np.hypot(vx, vy) <= FASTEST_M_S
     if not (near and straight and moving):
         return
     course = np.arctan2(vy, vx) + s.turned_rad  # Eqn 9, and what has been turned since
@@ -305,7 +297,7 @@ def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
 class Dilshad(Compiled):
     """Dilshad and Jahan (2014): yaw by the magnetometer, no centrifugal term; see the module."""
 
-    heading_reference: HeadingReference = "course"  # in the long run, through the GPS
+    heading_reference: HeadingReference = "course"  # in the long run, through the GPS; "nose" without its correction
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer")
     _step: ClassVar[Any] = staticmethod(step)
     _replay: ClassVar[Any] = staticmethod(_replay)
@@ -313,6 +305,8 @@ class Dilshad(Compiled):
     def __init__(self, params: DilshadParams | None = None) -> None:
         super().__init__(STATE_DTYPE)
         self.params = params or DilshadParams()
+        if math.isinf(self.params.gps_weight_s):
+            self.heading_reference = "nose"
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:

@@ -10,6 +10,8 @@ a parameter of the same name; one whose constructor takes an argument ``instrume
 A property is a data-sheet value or a setting.  It never depends on the errors drawn for one flight.
 """
 
+import difflib
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal, NamedTuple
 
@@ -23,6 +25,7 @@ class Property(NamedTuple):
     assumed: float | bool | None = None
 
 
+# Assumed is a present-day receiver, and a present-day inertial unit of 2000 deg/s and 16 g.
 PROPERTIES: Mapping[str, Property] = {
     "gps_filter_s": Property("time constant of the receiver's velocity filter; 0 is none", 0.0),
     "gps_latency_s": Property("from the moment a fix is true to its arrival", 0.3),
@@ -31,12 +34,12 @@ PROPERTIES: Mapping[str, Property] = {
     "gps_vertical_velocity": Property("whether the receiver reports a vertical velocity; else it reads 0"),
     "gps_rate_hz": Property("fixes per second"),
     "gps_noise_m_s": Property("standard deviation of each velocity component of a fix"),
-    "gyro_full_scale_rad_s": Property("largest rate that the gyro can read"),
+    "gyro_full_scale_rad_s": Property("largest rate that the gyro can read", 34.9),
     "gyro_noise_rad_s_sqrt_hz": Property("one-sided noise density of the gyro, quantisation and vibration included"),
     "gyro_bias_sigma_rad_s": Property("standard deviation of the gyro bias left after the calibration at power-up"),
     "gyro_gain_sigma": Property("standard deviation of the relative gain error of a gyro axis"),
     "gyro_cross_axis": Property("standard deviation of the sensitivity of a gyro axis to another"),
-    "force_full_scale_m_s2": Property("largest specific force that the accelerometer can read"),
+    "force_full_scale_m_s2": Property("largest specific force that the accelerometer can read", 156.9),
     "force_noise_m_s2_sqrt_hz": Property("one-sided noise density of the accelerometer, likewise"),
     "force_bias_sigma_m_s2": Property("standard deviation of the accelerometer bias"),
     "imu_rate_hz": Property("inertial samples per second"),
@@ -49,6 +52,45 @@ PROPERTIES: Mapping[str, Property] = {
 SIGMA_KNOWN_S = 0.02  # standard deviation of a latency that a data sheet or a log gives
 
 
+BOOLEAN = frozenset({"gps_stamped", "gps_vertical_velocity", "use_magnetometer", "use_airspeed"})
+"""Properties that are true or false; the others are numbers."""
+
+
+def property_value(name: str, value: Any) -> float | bool:
+    """`value` as what the property `name` is, a number or a truth value; it may be spelled as text.
+
+    Raises
+    ------
+    ValueError      no such property, or no such value
+    """
+    property_names([name])
+    if name in BOOLEAN:
+        truth = {"true": True, "1": True, "1.0": True, "false": False, "0": False, "0.0": False}
+        if str(value).lower() not in truth:
+            raise ValueError(f"{name} = {value!r}: must be true or false")
+        return truth[str(value).lower()]
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} = {value!r}: must be a number") from None
+    if math.isnan(number) or (number < 0.0 and name != "declination_rad"):
+        raise ValueError(f"{name} = {value!r}: must be a number, zero or more")
+    return number
+
+
+def property_names(names: Iterable[str]) -> tuple[str, ...]:
+    """`names`, each of a property; ``all`` stands for all of them.  ValueError for one that is none."""
+    wanted = tuple(filter(None, (name.strip() for name in names)))
+    if wanted == ("all",):
+        return tuple(PROPERTIES)
+    for name in wanted:
+        if name not in PROPERTIES:
+            near = difflib.get_close_matches(name, PROPERTIES, n=3, cutoff=0.5)
+            hint = f"did you mean {' or '.join(near)}?" if near else f"choose from {', '.join(PROPERTIES)}"
+            raise ValueError(f"unknown property of the instruments {name!r}: {hint}")
+    return wanted
+
+
 class Known(NamedTuple):
     """A property's value, and where it comes from; `origin` names the part, log parameter or map."""
 
@@ -57,8 +99,20 @@ class Known(NamedTuple):
     origin: str = ""
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data."""
-        return {"value": self.value, "source": self.source}
+        """As plain data; an infinite number, for which JSON has no word, is the text ``inf``."""
+        endless = isinstance(self.value, float) and math.isinf(self.value)
+        return {"value": str(self.value) if endless else self.value, "source": self.source}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> "Known":
+        """What `to_json` wrote."""
+        value = data["value"]
+        return cls(math.inf if value == "inf" else value, data["source"])
+
+
+def to_json(known: Mapping[str, Known]) -> dict[str, dict[str, Any]]:
+    """`known` as plain data: name -> value and source."""
+    return {name: entry.to_json() for name, entry in known.items()}
 
 
 class Instruments(Mapping[str, Known]):
@@ -103,10 +157,6 @@ class Instruments(Mapping[str, Known]):
     def given(self) -> dict[str, Known]:
         """The properties that have a value, by name."""
         return {name: known for name, known in self._record.items() if known.value is not None}
-
-    def to_json(self) -> dict[str, dict[str, Any]]:
-        """As plain data: name -> value and source."""
-        return {name: known.to_json() for name, known in self._record.items()}
 
 
 def _without_knowledge(name: str, *, withheld: bool = False) -> Known:

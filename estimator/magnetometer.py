@@ -16,10 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.interface import Array, Column
-from estimator.jit import kernel
+from estimator.jit import inlined, kernel
 from estimator.screening import MAG, refuse
 
 FIELD_RANGE_UT = 200.0  # the earth's field is 22 to 67 uT; the rest is room for iron
+WEAKEST_UT = 1.0  # a reading of less is that of a sensor that does not work
+SHORTEST_HORIZONTAL = 0.02  # sine of the angle between field and vertical below which there is no heading
 _LEAST_READINGS = 9  # an ellipsoid about a known centre has six unknowns
 _FLATTEST = 0.1  # the least ratio of two axes that is believed to be iron, not a sweep in one plane
 
@@ -130,16 +132,53 @@ FIELD = (
 """Columns of the state of an estimator that calls `take_field`."""
 
 
+@inlined
+def believable(m, limit_ut):  # type: ignore[no-untyped-def]
+    """Whether the reading `m`, shape (3,), can be a magnetic field; NaN, infinity, an overflow and zero cannot."""
+    within = abs(m[0]) <= limit_ut and abs(m[1]) <= limit_ut and abs(m[2]) <= limit_ut
+    return within and m[0] * m[0] + m[1] * m[1] + m[2] * m[2] >= WEAKEST_UT * WEAKEST_UT
+
+
 @kernel
 def take_field(row, s):  # type: ignore[no-untyped-def]
     """Whether a sample arrived in `row` that can be believed; corrected, it is then in ``s.field_b_ut``."""
     if not row.mag_new:
         return False
-    m, limit = row.mag_b_ut, s.field_range_ut
-    if not (abs(m[0]) <= limit and abs(m[1]) <= limit and abs(m[2]) <= limit):  # NaN is not
+    m = row.mag_b_ut
+    if not believable(m, s.field_range_ut):
         refuse(s, MAG)
         return False
     x, y, z = m[0] - s.hard_iron_b_ut[0], m[1] - s.hard_iron_b_ut[1], m[2] - s.hard_iron_b_ut[2]
     for i in range(3):
         s.field_b_ut[i] = s.soft_iron[i, 0] * x + s.soft_iron[i, 1] * y + s.soft_iron[i, 2] * z
+    return True
+
+
+@kernel
+def turn_to_north(R_eb, m, declination_rad):  # type: ignore[no-untyped-def]
+    """Turn the attitude about the vertical until the field `m` points to magnetic north: the heading to start with.
+
+    The tilt stays: where it is wrong by the angle a, the heading is wrong by up to about a times the tangent of the
+    field's dip.
+
+    Parameters
+    ----------
+    R_eb : shape (3, 3)         written
+    m : shape (3,)              field, body axes, any unit
+    declination_rad : float     of magnetic from true north, positive east
+
+    Returns
+    -------
+    bool    False, with nothing changed, where the field is vertical by this attitude, and tells no heading
+    """
+    north = R_eb[0, 0] * m[0] + R_eb[0, 1] * m[1] + R_eb[0, 2] * m[2]
+    east = R_eb[1, 0] * m[0] + R_eb[1, 1] * m[1] + R_eb[1, 2] * m[2]
+    horizontal = np.hypot(north, east)
+    if not horizontal > SHORTEST_HORIZONTAL * np.sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]):
+        return False
+    by_rad = declination_rad - np.arctan2(east, north)
+    c, z = np.cos(by_rad), np.sin(by_rad)
+    for j in range(3):
+        x, y = R_eb[0, j], R_eb[1, j]
+        R_eb[0, j], R_eb[1, j] = c * x - z * y, z * x + c * y
     return True

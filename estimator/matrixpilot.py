@@ -49,7 +49,7 @@ IMU: Theory", 2009.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any, ClassVar
 
 import numpy as np
@@ -58,13 +58,15 @@ from estimator.compiled import BELIEF, WIND, Compiled, write_estimate, write_win
 from estimator.interface import Column, HeadingReference, ImuSample, dtype_of
 from estimator.jit import kernel
 from estimator.kernels import clip, wrap
+from estimator.matrixpilot_params import CLASSIC as CLASSIC
+from estimator.matrixpilot_params import UDB4 as UDB4
+from estimator.matrixpilot_params import UDB5 as UDB5
+from estimator.matrixpilot_params import MatrixPilotParams
 from estimator.rotation import level, propagate, renormalise
 from estimator.screening import (
     FORCE_GOOD,
-    FORCE_RANGE_M_S2,
     G_M_S2,
     GPS,
-    GYRO_RANGE_RAD_S,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
@@ -92,62 +94,6 @@ SPEED_COUNT_M_S = 0.01
 COURSE_COUNT_RAD = 2.0 * math.pi / 256.0
 
 
-@dataclass(frozen=True, slots=True)
-class MatrixPilotParams:
-    """Gains and options; the defaults are the firmware's on its UDB4 board.
-
-    k_p_rp, k_i_rp : float     roll-pitch gains, 1/s and 1/s^2 per radian of error.  Large: errors go quickly, but
-                               accelerations get in
-    k_p_yaw, k_i_yaw : float   the same for yaw
-    centrifugal_from_gps : bool   omega x V with the speed of the GPS (Eqns 25-26, the firmware up to 2017)
-    keep_tilt : bool           renormalise without touching the Z row's direction (the firmware up to 2017: Eqns 18-21)
-    forward_acceleration : bool   take the change of speed between reports out of the accelerometer
-    estimate_wind : bool       learn the wind, and let yaw meet the velocity through the air
-    late_by_one_report : bool  carry a report on by its last change
-    spin_boost : bool          gains rise with the spin rate beyond 50 deg/s, to tenfold at 500 deg/s
-    calibrate_gain : bool      learn the gyros' gain while spinning, within +-10 %
-    pitch_error_limit : float  largest pitch error that is believed, of gravity; for launches.  inf turns it off
-    min_speed_m_s : float      slowest ground speed at which a course means anything
-    fixed_point : bool         the 16-bit arithmetic of the firmware
-    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
-    """
-
-    k_p_rp: float = 0.071
-    k_i_rp: float = 0.0044
-    k_p_yaw: float = 0.232
-    k_i_yaw: float = 0.0023
-    centrifugal_from_gps: bool = False
-    keep_tilt: bool = True
-    forward_acceleration: bool = True
-    estimate_wind: bool = True
-    late_by_one_report: bool = True
-    spin_boost: bool = True
-    calibrate_gain: bool = True
-    pitch_error_limit: float = 0.25
-    min_speed_m_s: float = 1.5
-    fixed_point: bool = False
-    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
-    force_range_m_s2: float = FORCE_RANGE_M_S2
-
-    def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name in ("pitch_error_limit", "gyro_range_rad_s", "force_range_m_s2"):
-                if not value > 0.0:
-                    raise ValueError(f"{f.name} is {value}; it must be more than zero")
-            elif not 0.0 <= value < math.inf:
-                raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
-            if f.name.endswith(("range_rad_s", "range_m_s2")) and value > 1e4:
-                raise ValueError(f"{f.name} is {value}; no sensor has that, 10000 is the most")
-
-
-UDB4 = MatrixPilotParams()
-"""Analog gyros, 40 Hz."""
-UDB5 = MatrixPilotParams(k_p_rp=0.119, k_i_rp=0.0074, k_p_yaw=0.141, k_i_yaw=0.0013)
-"""UDB5 and AUAV3: digital gyros, 200 Hz."""
-CLASSIC = MatrixPilotParams(centrifugal_from_gps=True, keep_tilt=False)
-"""The firmware up to 2017, UDB4."""
-
 _PARAMS = tuple(
     Column(f.name, (), "see MatrixPilotParams", integer=isinstance(f.default, bool))
     for f in fields(MatrixPilotParams)
@@ -166,6 +112,7 @@ _STATE = (
     Column("fixes", (), "reports in unbroken succession, up to two", integer=True),
     Column("fix_age_s", (), "time since the last report"),
     Column("report", (3,), "course [rad], ground speed and sink rate [m/s] of the last report"),
+    Column("down_m", (), "height of the last report, positive down, where it takes the place of a sink rate"),
     Column("v_e_m_s", (3,), "velocity over the ground, carried on to the present"),
     Column("airspeed_m_s", (), "length of that less the wind"),
     Column("forward_m_s2", (), "change of airspeed between the last two reports"),
@@ -312,10 +259,14 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
         s.yaw_b[0] = s.yaw_b[1] = s.yaw_b[2] = 0.0
     if not row.gps_new:
         return
-    course, speed, sink = row.gps_course_rad, row.gps_speed_m_s, row.gps_v_e_m_s[2]
-    if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0 and abs(sink) < 1000.0):
+    course, speed, sink, down = row.gps_course_rad, row.gps_speed_m_s, row.gps_v_e_m_s[2], row.gps_p_e_m[2]
+    vertical = abs(down) < 1e6 if s.climb_from_height else abs(sink) < 1000.0
+    if not (abs(course) < 100.0 and 0.0 <= speed < 1000.0 and vertical):
         refuse(s, GPS)
         return
+    if s.climb_from_height:
+        sink = (down - s.down_m) / s.fix_age_s if s.fixes > 0 and s.fix_age_s > 0.0 else 0.0
+        s.down_m = down
     carry_on(course, speed, sink, s)
     if s.estimate_wind:
         learn_wind(s)

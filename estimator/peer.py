@@ -21,6 +21,8 @@ from estimator.interface import (
     dtype_of,
 )
 from estimator.jit import kernel
+from estimator.magnetometer import FIELD_RANGE_UT, believable, turn_to_north
+from estimator.rotation import heading_rad
 from estimator.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
@@ -50,7 +52,6 @@ STATE_DTYPE = dtype_of(
 FIELD, COURSE = 8, 16  # bits beside those of `screen`: a magnetometer's sample arrived, there is a fresh course
 FIX_LIFE_S = 2.0  # an older course corrects nothing any more
 MIN_SPEED_M_S = 3.0  # a slower ground speed has no course
-WEAKEST_UT, STRONGEST_UT = 1.0, 1000.0  # outside it is no magnetic field of the earth, whatever iron is about
 
 NORTH_EAST_DOWN, NORTH_WEST_UP = np.eye(3), np.diag([1.0, -1.0, -1.0])
 EAST_NORTH_UP = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # from north-east-down, and back
@@ -58,7 +59,7 @@ RIGHT_DOWN, LEFT_UP = np.ones(3), np.array([1.0, -1.0, -1.0])  # forward-left-up
 
 
 @kernel
-def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped-def]
+def _screen(rows, k, uses_field, uses_course, field_range_ut, state):  # type: ignore[no-untyped-def]
     """Judge row `k` and take what is believed of it into the state; returns the bits of what is there."""
     row, s = rows[k], state[0]
     good = screen(row, s)
@@ -69,8 +70,7 @@ def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped
         s.force_b_m_s2[i] = row.force_b_m_s2[i]
         s.mag_b_ut[i] = row.mag_b_ut[i]
     if uses_field and row.mag_new:
-        f = row.mag_b_ut
-        if WEAKEST_UT < np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) < STRONGEST_UT:  # NaN is not either
+        if believable(row.mag_b_ut, field_range_ut):
             good |= FIELD
         else:
             refuse(s, MAG)
@@ -96,6 +96,12 @@ def package(name: str) -> Any:
 def to_quaternion(R: Array) -> Array:
     """Unit quaternion (w, x, y, z) of a rotation matrix, shape (4,)."""
     return np.asarray(Rotation.from_matrix(R).as_quat(scalar_first=True))
+
+
+def _about_down(angle_rad: float) -> Array:
+    """Turns the earth axes of an attitude about the vertical, shape (3, 3): the nose to the right by `angle_rad`."""
+    c, z = math.cos(angle_rad), math.sin(angle_rad)
+    return np.array([[c, -z, 0.0], [z, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @kernel
@@ -129,9 +135,13 @@ class PeerParams:
     """What all of them have in common.
 
     declination_rad : float     of magnetic north from true north, positive to the east; added to a magnetic heading
+    use_magnetometer : bool     use the magnetometer where the package can; False for one that is not calibrated
+    field_range_ut : float      a reading of an axis beyond this is rejected
     """
 
     declination_rad: float = 0.0
+    use_magnetometer: bool = True
+    field_range_ut: float = FIELD_RANGE_UT
 
     def __post_init__(self) -> None:
         if not abs(self.declination_rad) <= math.pi:
@@ -156,16 +166,21 @@ class Heard(NamedTuple):
 
 
 class Peer:
-    """What the adapters share: screening, calibration, axes.  A subclass brings `_start`, `_advance`, `_learnt`."""
+    """What the adapters share: screening, calibration, axes, the heading to start with.
+
+    A subclass brings `_start`, `_turn`, `_advance` and `_learnt`.
+    """
 
     heading_reference: HeadingReference = "nose"
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "magnetometer")
     _earth: ClassVar[Array] = NORTH_EAST_DOWN  # the package's earth axes from ours
     _body: ClassVar[Array] = RIGHT_DOWN  # its body components are ours times this
+    _finds_heading: ClassVar[bool] = False  # whether the package takes its first heading from the first field itself
 
     def __init__(self, params: PeerParams) -> None:
         self.params = params
-        self._uses = ("magnetometer" in self.uses, "gps" in self.uses)
+        uses_field = "magnetometer" in self.uses and bool(params.use_magnetometer)
+        self._uses = (uses_field, "gps" in self.uses, float(params.field_range_ut))
         self._state = np.zeros(1, STATE_DTYPE)
         # Views, because a field of a record takes microseconds to look up.
         (
@@ -178,11 +193,15 @@ class Peer:
             self._state[name] for name in ("dt_s", "rejected", "course_rad")
         )
         self._offset_b_rad_s = np.zeros(3)
-        self._magnetic = False  # whether the heading has come from a magnetometer
+        self._magnetic = False  # whether the package's north is the magnetic one
+        self._aligned = False  # whether a field or a course has set the heading
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample of something at rest; without, zero and level."""
+        """Power up: gyro offset and tilt from the mean sample of something at rest; without, zero and level.
+
+        The heading is north until the first field, or course, sets it.
+        """
         s = self._state[0]
         self._state.fill(0)
         s["gyro_range_rad_s"], s["force_range_m_s2"] = GYRO_RANGE_RAD_S, FORCE_RANGE_M_S2
@@ -190,7 +209,7 @@ class Peer:
         self._offset_b_rad_s = np.zeros(3) if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = self._offset_b_rad_s
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        self._magnetic = False
+        self._magnetic, self._aligned = False, self._finds_heading
         self._start(self._theirs(s["R_eb"]), settled=on_ground is not None)
 
     def update(self, m: Measurements) -> AttitudeEstimate:
@@ -198,10 +217,12 @@ class Peer:
         before = self.rejected
         good = _screen(m.rows, m.k, *self._uses, self._state)
         if good:
-            q = self._advance(self._heard(good))
-            declination_rad = self.params.declination_rad if self._magnetic else 0.0
-            if _take_quaternion(q, self._earth, self._body, declination_rad, self._state):
+            tells_heading = 0 if self._aligned else good & (FIELD | COURSE)
+            q = self._advance(self._heard(good & ~tells_heading))
+            if _take_quaternion(q, self._earth, self._body, self._declination_rad, self._state):
                 self._bias_b_rad_s[:] = self._offset_b_rad_s + self._body * self._learnt()
+                if tells_heading:
+                    self._align(tells_heading)
             else:  # the package lost itself: it goes on from the attitude before
                 self._rejected += 1
                 self._start(self._theirs(self._R_eb), settled=True)
@@ -223,9 +244,26 @@ class Peer:
         """Samples not believed since the reset, by the instrument that they are of."""
         return refusals(self._state)
 
+    @property
+    def _declination_rad(self) -> float:
+        """Of the package's north from ours."""
+        return self.params.declination_rad if self._magnetic else 0.0
+
     def _theirs(self, R_eb: Array) -> Array:
         """Quaternion in the axes of the package."""
-        return to_quaternion(self._earth @ R_eb * self._body)
+        return to_quaternion(self._earth @ _about_down(-self._declination_rad) @ R_eb * self._body)
+
+    def _align(self, by: int) -> None:
+        """Set the heading by the field that came, or by the course, and leave the tilt as it is."""
+        if by & FIELD:
+            self._aligned = self._magnetic = bool(
+                turn_to_north(self._R_eb, self._mag_b_ut, self.params.declination_rad)
+            )
+        else:
+            self._aligned = True
+            self._R_eb[:] = _about_down(float(self._course_rad[0] - heading_rad(self._R_eb))) @ self._R_eb
+        if self._aligned:
+            self._turn(self._theirs(self._R_eb))
 
     def _heard(self, good: int) -> Heard:
         body = self._body
@@ -243,6 +281,10 @@ class Peer:
         """Start the package at the attitude `q` in its own axes, well known where `settled`."""
         raise NotImplementedError
 
+    def _turn(self, q: Array) -> None:
+        """Set the package's attitude, and leave what it has learnt."""
+        raise NotImplementedError
+
     def _advance(self, heard: Heard) -> Array:
         """One sample.  Returns the package's quaternion (w, x, y, z), float64."""
         raise NotImplementedError
@@ -257,11 +299,11 @@ class Keeping(Peer):
 
     def snapshot(self) -> tuple[Any, ...]:
         """Everything that changes."""
-        return (self._state.copy(), self._offset_b_rad_s.copy(), self._magnetic, self._kept())
+        return (self._state.copy(), self._offset_b_rad_s.copy(), self._magnetic, self._aligned, self._kept())
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
         """Go on from a `snapshot`."""
-        state, offset, self._magnetic, kept = snapshot
+        state, offset, self._magnetic, self._aligned, kept = snapshot
         self._state[:], self._offset_b_rad_s = state, offset.copy()
         self._keep(kept)
 

@@ -17,14 +17,18 @@ peer_imufusion_9d  imufusion, `update`                    north-east-down       
 None of them knows of centrifugal acceleration, of speed, or of wind.  Without a magnetometer the heading of the
 first three is that of the gyros.
 
+All begin with the heading of the first field that can be believed, or of the first course: their corrections would take
+minutes to find it from north.  VQF takes the whole of the first field that it is given itself.
+
 Peculiarities of the packages
 -----------------------------
 *ahrs 0.4* returns the attitude uncorrected where the gyro reads exactly zero on all three axes.
 
 *imufusion 1.3* accepts ``AhrsSettings(convention=...)`` and ignores it; set as an attribute it counts.  Its external
 heading is spread over a body that rolls and does not pitch: at the pitch theta it settles where
-``tan(yaw) = tan(heading) / cos(theta)``.  It computes in single precision, and its state can neither be read nor
-set: these two have no `snapshot`.
+``tan(yaw) = tan(heading) / cos(theta)``.  ``update_no_magnetometer`` sets the heading back to zero at every call of its
+first 3 s; ``update`` with a field of zero is the same without that.  It computes in single precision, and its state can
+neither be read nor set: these two have no `snapshot`.
 
 *vqf 2.1* is told one sample interval, and one of the magnetometer, at its construction: those of the first sample,
 and between the first two of the magnetometer.  Where samples were lost the one that arrived is given as often as it
@@ -48,7 +52,7 @@ from estimator.interface import Array, HeadingReference, Instrument
 from estimator.peer import EAST_NORTH_UP, LEFT_UP, NORTH_WEST_UP, Heard, Keeping, Peer, PeerParams, package
 from estimator.screening import G_M_S2
 
-NO_FORCE = np.zeros(3)
+NO_FORCE, NO_FIELD = np.zeros(3), np.zeros(3)
 SHORTEST_S = 5e-4  # sample interval that a package is told at least
 
 
@@ -60,6 +64,9 @@ class _Ahrs(Keeping):
     def _start(self, q: Array, *, settled: bool) -> None:  # noqa: ARG002 - they know no start
         self._q = q
         self._make()
+
+    def _turn(self, q: Array) -> None:
+        self._q = q
 
     def _make(self) -> None:
         raise NotImplementedError
@@ -166,6 +173,7 @@ class Vqf(Keeping):
     """VQF of Laidig and Seel, from the package vqf: 6D, and 9D once a magnetometer has been heard twice."""
 
     _earth, _body = EAST_NORTH_UP, LEFT_UP
+    _finds_heading = True
     params: VqfParams
 
     def __init__(self, params: VqfParams | None = None) -> None:
@@ -261,6 +269,9 @@ class Imufusion(Peer):
             self._filter.skip_startup()  # else it pulls hard for its first seconds
         self._filter.set_quaternion(q)
 
+    def _turn(self, q: Array) -> None:
+        self._filter.set_quaternion(q)
+
     def _set(self, sample_hz: float) -> None:
         p, settings = self.params, self._fusion.AhrsSettings()
         settings.convention = self._fusion.CONVENTION_NED  # as a keyword it would be ignored
@@ -282,7 +293,7 @@ class Imufusion(Peer):
 
     def _give(self, gyro_deg_s: Array, force_g: Array, heard: Heard) -> None:
         if heard.course_rad is None:
-            self._filter.update_no_magnetometer(gyro_deg_s, force_g)
+            self._filter.update(gyro_deg_s, force_g, NO_FIELD)
         else:
             self._filter.update_external_heading(gyro_deg_s, force_g, math.degrees(heard.course_rad))
 
@@ -295,7 +306,7 @@ class Imufusion9D(Imufusion):
 
     def _give(self, gyro_deg_s: Array, force_g: Array, heard: Heard) -> None:
         if heard.field_ut is None:
-            self._filter.update_no_magnetometer(gyro_deg_s, force_g)
+            self._filter.update(gyro_deg_s, force_g, NO_FIELD)
         else:
             self._magnetic = True
             self._filter.update(gyro_deg_s, force_g, heard.field_ut)

@@ -44,7 +44,8 @@ turn about the vertical accelerates horizontally: the speed for which ``g_refere
 reference of Eqn 22 is then the direction of ground velocity less wind, and the heading converges to the nose.
 
 *Saturation* (the paper: "error will be introduced into the roll-pitch orientation").  A clipped axis says no more
-than that it is clipped: what the estimate itself expects stands in for it, and only the other axes steer.
+than that it is clipped: what the estimate itself expects stands in for it, and only the other axes steer.  The full
+scale of the accelerometer is known from its data sheet.
 
 *Yaw lock after the launch* (the paper: "a large weight"; off by default).  A larger weight until yaw is locked.
 
@@ -81,6 +82,7 @@ from estimator.screening import (
     GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
+    airspeed_came,
     attitude_at_rest,
     offset_at_rest,
     refuse,
@@ -94,6 +96,7 @@ LOCK_TAN, LOCK_S = math.tan(math.radians(15.0)), 1.0  # yaw is locked once it wa
 TURN_RAD_S, TURN_S = 0.3, 3.0  # slowest turn that tells a speed, and how slowly it is believed
 SHORTEST_NOSE = 0.3  # a shorter filtered nose (a loop, a spin) restores no speed
 LEAST_CLIP_M_S2 = 1.5 * G_M_S2  # no accelerometer that flies ends below
+CLIPPED = 0.99  # of the full scale: the largest count of 8 bits is 0.992 of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,10 +114,11 @@ class PremerlaniParams:
     gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
     rotate_history : bool      take the receiver's lag out of the yaw loop
     launch_gate : float        no roll-pitch correction while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
-    clip_m_s2 : float          an accelerometer axis that reads so much is clipped: a count less than its full scale;
-                               inf where that is not known
+    force_full_scale_m_s2 : float   largest specific force that the accelerometer can read; inf where nobody knows
+    clip_m_s2 : float          an accelerometer axis that reads so much is clipped.  Low: sound readings are left out;
+                               high: clipped ones steer.  inf: 1 % below the full scale
     find_clip : bool           take the largest reading of an axis for its full scale once it comes a second time
-    airspeed : bool            use the airspeed of a sensor in Eqn 25 while there is one
+    use_airspeed : bool        use the airspeed of a sensor in Eqn 25 while there is one
     turn_speed : bool          learn the speed of Eqn 25 in level turns; good in wind
     learn_wind : bool          learn the wind in turns, for the reference of Eqn 22 and the speed of Eqn 25; the
                                heading then converges to the nose.  Needs `rotate_history`
@@ -134,9 +138,10 @@ class PremerlaniParams:
     gps_latency_s: float = 0.3
     rotate_history: bool = True
     launch_gate: float = 0.2
+    force_full_scale_m_s2: float = math.inf
     clip_m_s2: float = math.inf
     find_clip: bool = False
-    airspeed: bool = True
+    use_airspeed: bool = True
     turn_speed: bool = False
     learn_wind: bool = False
     min_speed_m_s: float = 3.0
@@ -145,8 +150,8 @@ class PremerlaniParams:
 
     def __post_init__(self) -> None:
         positive = (
-            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "clip_m_s2", "gyro_range_rad_s",
-            "force_range_m_s2",
+            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "force_full_scale_m_s2", "clip_m_s2",
+            "gyro_range_rad_s", "force_range_m_s2",
         )  # fmt: skip
         for f in fields(self):
             value = getattr(self, f.name)
@@ -160,6 +165,11 @@ class PremerlaniParams:
                 raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
         if self.gps_latency_s > LONGEST_LATENCY_S:
             raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
+        if self.force_full_scale_m_s2 <= G_M_S2:
+            raise ValueError(
+                f"force_full_scale_m_s2 is {self.force_full_scale_m_s2} m/s^2; gravity is felt, it must be more than "
+                f"{G_M_S2}"
+            )
         if self.clip_m_s2 < LEAST_CLIP_M_S2:
             raise ValueError(
                 f"clip_m_s2 is {self.clip_m_s2} m/s^2; gravity is felt, {LEAST_CLIP_M_S2:.1f} is the least"
@@ -171,7 +181,7 @@ class PremerlaniParams:
 _PARAMS = tuple(
     Column(f.name, (), "see PremerlaniParams", integer=isinstance(f.default, bool))
     for f in fields(PremerlaniParams)
-    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
+    if f.name not in ("gyro_range_rad_s", "force_range_m_s2", "force_full_scale_m_s2")  # two are columns of SCREEN
 )
 _STATE = (
     Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
@@ -202,7 +212,7 @@ STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + LAG + _PARAMS + _STATE)
 def take_air(row, s):  # type: ignore[no-untyped-def]
     """Take the airspeed of an air-data sample that arrived."""
     s.air_age_s += s.dt_s
-    if row.air_new and s.airspeed and 0.0 < row.airspeed_m_s < 1000.0:
+    if s.use_airspeed and airspeed_came(row, s) and row.airspeed_m_s > 0.0:
         s.airspeed_m_s = row.airspeed_m_s
         s.air_age_s = 0.0
 
@@ -407,11 +417,13 @@ class Premerlani(Compiled):
         """
         s = self._state[0]
         self._state.fill(0)
-        for f in fields(self.params):
-            s[f.name] = getattr(self.params, f.name)
+        for name in (*(column.name for column in _PARAMS), "gyro_range_rad_s", "force_range_m_s2"):
+            s[name] = getattr(self.params, name)
+        if math.isinf(self.params.clip_m_s2):
+            s["clip_m_s2"] = CLIPPED * self.params.force_full_scale_m_s2
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
-        s["may_clip"] = self.params.find_clip or math.isfinite(self.params.clip_m_s2)
+        s["may_clip"] = self.params.find_clip or math.isfinite(s["clip_m_s2"])
         s["fix_age_s"] = s["air_age_s"] = math.inf
         start_history(s)

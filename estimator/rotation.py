@@ -114,6 +114,30 @@ def _orthogonalise(R_eb, xx, yy, error):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def renormalise_exactly(R_eb):  # type: ignore[no-untyped-def]
+    """Bring the matrix back to a rotation, in place, each row by its exact length; False if hopeless.
+
+    J. van Zundert et al., "Direction cosine matrix based IMU implementation in Matlab/Simulink", 2013, Eqns 2.4-2.6.
+    """
+    error = R_eb[0, 0] * R_eb[1, 0] + R_eb[0, 1] * R_eb[1, 1] + R_eb[0, 2] * R_eb[1, 2]
+    for j in range(3):
+        x, y = R_eb[0, j], R_eb[1, j]
+        R_eb[0, j] = x - 0.5 * error * y  # Eqn 2.4
+        R_eb[1, j] = y - 0.5 * error * x
+    R_eb[2, 0] = R_eb[0, 1] * R_eb[1, 2] - R_eb[0, 2] * R_eb[1, 1]  # Eqn 2.5
+    R_eb[2, 1] = R_eb[0, 2] * R_eb[1, 0] - R_eb[0, 0] * R_eb[1, 2]
+    R_eb[2, 2] = R_eb[0, 0] * R_eb[1, 1] - R_eb[0, 1] * R_eb[1, 0]
+    for i in range(3):
+        length = np.sqrt(R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2)
+        if not 1e-6 < length < 1e6:
+            return False
+        scale = 1.0 / length
+        for j in range(3):
+            R_eb[i, j] *= scale  # Eqn 2.6
+    return True
+
+
+@kernel
 def level(R_eb):  # type: ignore[no-untyped-def]
     """Set the matrix to level, heading north, in place."""
     for i in range(3):

@@ -21,6 +21,7 @@ COAST_S = 0.25  # how long the last good rate stands in for a broken gyro
 AT_REST_RAD_S, AT_REST_G = math.radians(45.0), 0.2
 GYRO_RANGE_RAD_S = math.radians(2100.0)  # readings beyond are no measurement: just more than the largest parts have
 FORCE_RANGE_M_S2 = 17.0 * G_M_S2
+AIRSPEED_RANGE_M_S = 1000.0
 
 PASSED, GYRO_GOOD, FORCE_GOOD = 1, 2, 4  # bits of what `screen` answers: time passed, and what to believe
 ALL_GOOD = 7
@@ -38,6 +39,7 @@ SCREEN = (
     Column("dt_s", (), "time that this tick accounts for"),
     Column("bad_s", (), "how long the gyro has been broken"),
     Column("rejected", (), "ticks in which something was not believed", integer=True),
+    Column("spoilt", (), "1 where this tick is counted among them already", integer=True),
     Column("refused", (len(REFUSED),), "samples not believed, by what they are of: see REFUSED", integer=True),
 )
 
@@ -69,9 +71,33 @@ def _interval_s(row, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def refuse(s, what):  # type: ignore[no-untyped-def]
-    """Count a sample of the instrument `what` (an index of REFUSED) that is not believed."""
-    s.rejected += 1
+    """Count a sample of the instrument `what` (an index of REFUSED) that is not believed, and the tick once."""
     s.refused[what] += 1
+    if not s.spoilt:
+        s.spoilt = 1
+        s.rejected += 1
+
+
+@inlined
+def screen_gyro(row, s):  # type: ignore[no-untyped-def]
+    """Judge the time and the gyro of `row`, set ``s.dt_s``, count a rejection: for what uses no accelerometer.
+
+    Returns
+    -------
+    int    0 where no time has passed, else PASSED with GYRO_GOOD where it is
+    """
+    s.spoilt = 0
+    s.dt_s = _interval_s(row, s)
+    if s.dt_s <= 0.0:
+        refuse(s, TIME)
+        return 0
+    s.clock_s += s.dt_s
+    if _within(row.gyro_b_rad_s, s.gyro_range_rad_s):
+        s.bad_s = 0.0
+        return PASSED | GYRO_GOOD
+    s.bad_s += s.dt_s
+    refuse(s, GYRO)
+    return PASSED
 
 
 @inlined
@@ -82,26 +108,29 @@ def screen(row, s):  # type: ignore[no-untyped-def]
     -------
     int    0 where no time has passed, else PASSED with GYRO_GOOD and FORCE_GOOD as far as they are
     """
-    s.dt_s = _interval_s(row, s)
-    good = 0
-    if s.dt_s > 0.0:
-        good = PASSED
-        s.clock_s += s.dt_s
-        s.bad_s += s.dt_s
-        if _within(row.gyro_b_rad_s, s.gyro_range_rad_s):
-            good |= GYRO_GOOD
-            s.bad_s = 0.0
-        else:
-            s.refused[GYRO] += 1
+    good = screen_gyro(row, s)
+    if good:
         if _within(row.force_b_m_s2, s.force_range_m_s2):
             good |= FORCE_GOOD
         else:
-            s.refused[FORCE] += 1
-    else:
-        s.refused[TIME] += 1
-    if good != ALL_GOOD:
-        s.rejected += 1
+            refuse(s, FORCE)
     return good
+
+
+@inlined
+def airspeed_came(row, s):  # type: ignore[no-untyped-def]
+    """Whether an airspeed that can be believed arrived in `row`; it may be below zero, as a pitot tube at rest reads.
+
+    NaN is refused only after a first airspeed: before that it says that no pitot tube is fitted, or none has reported.
+    Needs ``s.air_age_s``, infinite before the first.
+    """
+    if not row.air_new:
+        return False
+    if abs(row.airspeed_m_s) < AIRSPEED_RANGE_M_S:
+        return True
+    if s.air_age_s < np.inf or not np.isnan(row.airspeed_m_s):
+        refuse(s, AIR)
+    return False
 
 
 @inlined

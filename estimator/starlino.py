@@ -31,6 +31,8 @@ What the tutorial leaves open
 Without a magnetometer the heading is that of the gyros.  (The tutorial's sample code then has a virtual one, "always
 pointing North": it pulls the nose to the north, whatever the aeroplane does, and is not for something that flies.)
 The weights count a sample: at another sample rate other weights are right.
+The tutorial starts at any heading and lets the magnetometer pull it round.  Here the first field sets it, as in every
+estimator of this project that has a magnetometer.
 
 References
 ----------
@@ -46,7 +48,14 @@ import numpy as np
 from estimator.compiled import BELIEF, Compiled, write_estimate
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
-from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
+from estimator.magnetometer import (
+    FIELD,
+    FIELD_RANGE_UT,
+    SHORTEST_HORIZONTAL,
+    Calibration,
+    take_field,
+    turn_to_north,
+)
 from estimator.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
@@ -61,7 +70,6 @@ from estimator.screening import (
 
 ZERO = (0.0, 0.0, 0.0)
 SMALL_RAD = 0.1  # "small": larger rotations are applied in parts
-SHORTEST_WEST = 0.02  # sine of the angle between field and vertical below which there is no north
 NED_FROM_NWU = np.diag([1.0, -1.0, -1.0])
 
 
@@ -74,7 +82,7 @@ class StarlinoParams:
                                with a time constant of (s_g + s_a) / s_a = 21 samples
     band : float               the accelerometer's weight falls to zero, linearly, while its length is off that of
                                gravity by this part of it (comment 28: 0.8 to 1.2 g); inf keeps its full weight
-    magnetometer : bool        9-DOF; without, or where no sample comes: 6-DOF
+    use_magnetometer : bool    9-DOF; without, or where no sample comes: 6-DOF
     calibration                of the magnetometer
     declination_rad : float    of magnetic from true north, positive east
     gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
@@ -84,7 +92,7 @@ class StarlinoParams:
     s_a: float = 1.0
     s_m: float = 1.0
     band: float = 0.2
-    magnetometer: bool = True
+    use_magnetometer: bool = True
     calibration: Calibration = field(default_factory=Calibration)
     declination_rad: float = 0.0
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S
@@ -105,15 +113,15 @@ class StarlinoParams:
 
 
 _RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
-_OF_PARAMS = ("s_g", "s_a", "s_m", "band", "magnetometer")
+_OF_PARAMS = ("s_g", "s_a", "s_m", "band", "use_magnetometer")
 STATE_DTYPE = dtype_of(
     (
         *BELIEF,
         *SCREEN,
         *FIELD,
-        *(Column(name, (), "see StarlinoParams", integer=name == "magnetometer") for name in _OF_PARAMS),
-        Column("cos_declination", (), "of magnetic from true north"),
-        Column("sin_declination", (), "positive east"),
+        *(Column(name, (), "see StarlinoParams", integer=name == "use_magnetometer") for name in _OF_PARAMS),
+        Column("declination_rad", (), "of magnetic from true north, positive east"),
+        Column("aligned", (), "1 once a field has set the heading", integer=True),
         Column("dcm", (3, 3), "rows I, J, K: north, west and zenith, seen from the body"),
     )
 )
@@ -161,15 +169,16 @@ def north(A, s):  # type: ignore[no-untyped-def]
     M = (s.field_b_ut[0], s.field_b_ut[1], s.field_b_ut[2])
     W = cross(A, M)
     horizontal2 = dot(W, W)
-    if not horizontal2 > SHORTEST_WEST**2 * dot(M, M):  # a field of no length is none either
+    if not horizontal2 > SHORTEST_HORIZONTAL**2 * dot(M, M):  # a field of no length is none either
         return A, False
     N = cross(W, A)  # magnetic: true north lies to the west of it by the declination
     scale = 1.0 / np.sqrt(horizontal2)
-    return plus(plus(ZERO, scale * s.cos_declination, N), scale * s.sin_declination, W), True
+    c, z = np.cos(s.declination_rad), np.sin(s.declination_rad)
+    return plus(plus(ZERO, scale * c, N), scale * z, W), True
 
 
 @kernel
-def displacement(row, s, good):  # type: ignore[no-untyped-def]
+def displacement(row, s, good, field_came):  # type: ignore[no-untyped-def]
     """The weighted mean d theta of what the instruments felt (Part 4), in body axes."""
     I0, J0, K0 = axis(s.dcm, 0), axis(s.dcm, 1), axis(s.dcm, 2)
     w, dt = s.omega_b_rad_s, s.dt_s
@@ -177,7 +186,6 @@ def displacement(row, s, good):  # type: ignore[no-untyped-def]
     g = (-dt * w[0], -dt * w[1], -dt * w[2])
     i, j, k = s.s_g * dot(g, I0), s.s_g * dot(g, J0), s.s_g * dot(g, K0)
     by_i = by_j = by_k = s.s_g
-    field_came = s.magnetometer and take_field(row, s)
     f = row.force_b_m_s2
     length = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
     part = trust(length, s.band) if good & FORCE_GOOD else 0.0
@@ -228,6 +236,15 @@ def to_north_east_down(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def align(s):  # type: ignore[no-untyped-def]
+    """Begin with the heading of the first field, the tilt as it is."""
+    if turn_to_north(s.R_eb, s.field_b_ut, s.declination_rad):
+        s.aligned = 1
+        for i in range(3):
+            s.dcm[0, i], s.dcm[1, i], s.dcm[2, i] = s.R_eb[0, i], -s.R_eb[1, i], -s.R_eb[2, i]
+
+
+@kernel
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One sample; returns the `Health`."""
     row, s = rows[k], state[0]
@@ -235,7 +252,10 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     good = screen(row, s)
     if good:
         take_rate(row, s, good)
-        turn(s.dcm, displacement(row, s, good))
+        field_came = s.use_magnetometer and take_field(row, s)
+        if field_came and not s.aligned:
+            align(s)
+        turn(s.dcm, displacement(row, s, good, field_came))
         to_north_east_down(s)
     return 1 if s.rejected == before else 2  # Health.GOOD, Health.POOR
 
@@ -261,7 +281,7 @@ class Starlino(Compiled):
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: tilt and gyro offset from the mean sample of something at rest, heading north.
+        """Power up: tilt and gyro offset from the mean sample of something at rest; the first field sets the heading.
 
         Without a sample, the tutorial's unit matrix, which corrects itself (comment 112).
         """
@@ -271,8 +291,7 @@ class Starlino(Compiled):
             s[name] = getattr(self.params, name)
         for f in fields(Calibration):
             s[f.name] = getattr(self.params.calibration, f.name)
-        d = self.params.declination_rad
-        s["cos_declination"], s["sin_declination"] = math.cos(d), math.sin(d)
+        s["declination_rad"] = self.params.declination_rad
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         s["dcm"] = NED_FROM_NWU @ s["R_eb"]
         s["gyro_bias_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)

@@ -4,6 +4,7 @@ NOAA and BGS, "The US/UK World Magnetic Model for 2025-2030" (WMM2025): a spheri
 with a linear change in time.  It knows the core's field alone; rocks and steel nearby add their own.
 """
 
+import math
 from functools import cache
 from typing import Any, Final
 
@@ -13,6 +14,7 @@ from estimator.interface import Array
 
 FIRST_YEAR: Final = 2025.0
 LAST_YEAR: Final = 2030.0
+EARLIEST_YEAR: Final = 2010.0  # of the older models, for the declination of recorded flights
 
 
 def require_year(owner: str, year: float) -> None:
@@ -24,10 +26,10 @@ def require_year(owner: str, year: float) -> None:
 
 
 @cache
-def _model() -> Any:
+def _model(first_year: int = int(FIRST_YEAR)) -> Any:
     from pygeomag import GeoMag  # here, so that a flight without a magnetometer does not load it
 
-    return GeoMag(base_year=int(FIRST_YEAR))
+    return GeoMag(base_year=first_year)
 
 
 @cache
@@ -58,3 +60,25 @@ def field_e_ut(latitude_deg: float, longitude_deg: float, height_m: float, year:
     field = 1e-3 * np.array([found.x, found.y, found.z])  # it gives nanotesla
     field.flags.writeable = False
     return field
+
+
+@cache
+def declination_rad(latitude_deg: float, longitude_deg: float, height_m: float, year: float) -> float:
+    """Magnetic north from true north, positive to the east, by the model of that year.
+
+    Parameters
+    ----------
+    latitude_deg, longitude_deg     geodetic, -90..90 and -180..180
+    height_m                        above the ellipsoid
+    year                            decimal; one outside 2010..2030 counts as the nearest of these
+
+    Raises
+    ------
+    ValueError      a place that is not on earth
+    """
+    if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0):
+        raise ValueError(f"latitude {latitude_deg!r}, longitude {longitude_deg!r} deg: choose a place on earth")
+    year = min(max(year, EARLIEST_YEAR), LAST_YEAR)
+    model = _model(int(min(5.0 * (year // 5.0), FIRST_YEAR)))
+    found = model.calculate(glat=latitude_deg, glon=longitude_deg, alt=1e-3 * height_m, time=year)
+    return math.radians(found.d)

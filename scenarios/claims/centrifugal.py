@@ -28,7 +28,7 @@ WINDS_M_S = (0.0, LIGHT_M_S, 0.2 * CRUISE_M_S, STRONG_M_S)
 def _step_as_if_standing(rows, k, state):  # type: ignore[no-untyped-def]
     """`premerlani` told all the time that its airspeed is zero: Eqn 25 vanishes, the rest stays."""
     s = state[0]
-    s.airspeed = 0  # a sensor that knows better is not listened to
+    s.use_airspeed = 0  # a sensor that knows better is not listened to
     s.airspeed_m_s = s.air_age_s = 0.0
     return step(rows, k, state)
 

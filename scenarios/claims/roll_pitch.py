@@ -37,7 +37,7 @@ WINDS_M_S = (0.0, 2.5, 5.0, 7.5)
 
 def paper_of_2009(**others: Any) -> Premerlani:
     """Centrifugal acceleration from the speed over the ground, along the nose."""
-    return Premerlani(PremerlaniParams(w_rp=WEIGHT, k_i=0.0, airspeed=False, **others))
+    return Premerlani(PremerlaniParams(w_rp=WEIGHT, k_i=0.0, use_airspeed=False, **others))
 
 
 def note_of_2011(**others: Any) -> GpsVelocity:
@@ -47,7 +47,7 @@ def note_of_2011(**others: Any) -> GpsVelocity:
 
 def note_by_course() -> ApDcm:
     """The same as ArduPilot had it, with the course for a heading."""
-    return ApDcm(ApDcmParams(kp=WEIGHT, ki=0.0, ki_yaw=0.0, use_compass=False))
+    return ApDcm(ApDcmParams(kp=WEIGHT, ki=0.0, ki_yaw=0.0, use_magnetometer=False))
 
 
 def note_by_compass(**others: Any) -> GpsVelocityMagnetometer:

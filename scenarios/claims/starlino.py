@@ -41,7 +41,7 @@ def set_attitude(estimator: Starlino, R_eb: Array) -> Starlino:
 
 def six_axes(s_g: float = S_G, band: float = 0.2) -> Starlino:
     """Without a magnetometer."""
-    return Starlino(StarlinoParams(s_g=s_g, s_a=S_A, band=band, magnetometer=False))
+    return Starlino(StarlinoParams(s_g=s_g, s_a=S_A, band=band, use_magnetometer=False))
 
 
 def _weights(seeds: Sequence[int]) -> Finding:

@@ -57,7 +57,7 @@ def _blind_axis(_seeds: Sequence[int]) -> Finding:
     log = seen(there_and_back, 40.0)
     true = np.unwrap(heading_rad(log.truth["R_eb"]))
     printed = _weighted_heading(log)
-    mended = np.unwrap(heading_rad(Starlino(StarlinoParams(magnetometer=False)).replay(log.measured)["R_eb"]))
+    mended = np.unwrap(heading_rad(Starlino(StarlinoParams(use_magnetometer=False)).replay(log.measured)["R_eb"]))
     once, back, mended_once = (
         abs(math.degrees(told[k] - true[k])) for told, k in ((printed, 999), (printed, -1), (mended, 999))
     )

@@ -40,7 +40,7 @@ def bench(motion: Motion, duration_s: float, imu_hz: int) -> Log:
 
 def original(quirks: frozenset[Quirk] = JULY_2013, *, flying: bool = False, compass: bool = True) -> ApDcm:
     """July 2013, or with fewer quirks; on the bench it was a copter's."""
-    params = ApDcmParams(quirks, declination_rad=DECLINATION_RAD, fly_forward=flying, use_compass=compass)
+    params = ApDcmParams(quirks, declination_rad=DECLINATION_RAD, fly_forward=flying, use_magnetometer=compass)
     return ApDcm(params)
 
 

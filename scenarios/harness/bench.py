@@ -17,17 +17,19 @@ from rich.text import Text
 
 from autopilot.interface import NEUTRAL, Autopilot, Mode, Setpoint
 from autopilot.pilot import Script, Timed
+from estimator.instruments import Instruments
 from estimator.interface import AttitudeEstimator, Measurements
 from scenarios.harness import console
 from scenarios.harness.checks import Row
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator
+from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
 from sim.acceptance import command_of, estimate_of
 from sim.clock import Rates
 from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Flight, Log, Outcome
 from sim.loop import fly, make_ready, power_up
 from sim.plant import InFlight
+from sim.sensors.known import data_sheets
 from sim.sensors.suite import Suite
 
 RATIO_LIMIT = 1.6
@@ -108,14 +110,16 @@ class Cruise:
         self.second = round(1.0 / rates.dt_s)
         self.log = Log.empty(rates.ticks(duration_s))
         self.plant = JsbsimPlant(start=InFlight(heading_rad=0.0), rates=rates)
-        self.suite = Suite(suite_params("generic", {}), rates, seed=0)
+        suite = suite_params("generic", {})
+        self.suite = Suite(suite, rates, seed=0)
+        self.instruments = Instruments(data_sheets(suite, rates))
         self.spec = estimator
         self.setpoint = Setpoint(Mode.COURSE, course_rad=0.0, height_m=60.0)
 
     def pilots(self) -> tuple[AttitudeEstimator, Autopilot]:
         """A new estimator and a new autopilot, switched on."""
-        estimator = load_estimator(self.spec)
-        autopilot = load_autopilot("dcm", heading_reference_of(estimator))
+        estimator = equipped(self.spec, self.instruments).code
+        autopilot = equipped_autopilot("dcm", heading_reference_of(estimator), "endurance", self.instruments).code
         make_ready(estimator, autopilot, self.log)
         power_up(estimator, None)
         return estimator, autopilot

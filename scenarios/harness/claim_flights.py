@@ -10,7 +10,8 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
-from scenarios.harness.flight import Maker, fly_scenario
+from scenarios.harness.flight import fly_scenario
+from scenarios.harness.plugins import Maker
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from sim.log import Flight, Outcome

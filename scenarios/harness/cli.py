@@ -38,6 +38,7 @@ from scenarios.harness.cli_options import (
     UnitOption,
     WebOption,
     WindOption,
+    WithholdOption,
     WorkersOption,
     air,
     changes_of,
@@ -123,6 +124,7 @@ def fly(
         int | None, typer.Option(help="Another seed, another flight; the same seed, the same bits. [default: 0]")
     ] = None,
     set_: SetOption = None,
+    withhold: WithholdOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the recording.")] = FLIGHTS,
     no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Watch it in the Rerun viewer, in real time.")] = False,
@@ -133,7 +135,7 @@ def fly(
     from scenarios.harness import single, viewing
 
     named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault) | given(
-        {"estimator": estimator, "duration_s": duration, "seed": seed}
+        {"estimator": estimator, "duration_s": duration, "seed": seed, "withheld": withhold}
     )
     with reporting(json_) as report:
         with usage():
@@ -163,6 +165,7 @@ def check(
     sensors: SensorsOption = None,
     fault: FaultOption = None,
     set_: SetOption = None,
+    withhold: WithholdOption = None,
     workers: WorkersOption = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
     markdown: MarkdownOption = None,
@@ -177,6 +180,7 @@ def check(
                 check_file(path)
             named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
+            changes |= given({"withheld": withhold})
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
@@ -210,6 +214,7 @@ def compare(
     sensors: SensorsOption = None,
     fault: FaultOption = None,
     set_: SetOption = None,
+    withhold: WithholdOption = None,
     workers: WorkersOption = None,
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it, as PNG, SVG or PDF.")] = None,
     markdown: MarkdownOption = None,
@@ -226,6 +231,7 @@ def compare(
             handbook.check_picture(picture)
             carried = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
+            changes |= given({"withheld": withhold})
             plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
@@ -289,6 +295,7 @@ def replay(
     columns: ColumnsOption = None,
     imu: UnitOption = None,
     set_: ParameterOption = None,
+    withhold: WithholdOption = None,
     calibration: CalibrationOption = None,
     airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
     settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,
@@ -310,6 +317,7 @@ def replay(
                 columns=columns,
                 imu=imu,
                 params=changes_of(set_),
+                withheld=names_of(withhold),
                 window=Window(airborne, settle, calibration),
                 rerun=not no_rerun,
             )

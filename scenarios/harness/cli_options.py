@@ -89,6 +89,16 @@ LogEstimatorsOption = Annotated[
 ]
 
 
+WithholdOption = Annotated[
+    str | None,
+    typer.Option(
+        "--withhold",
+        metavar="NAME,...",
+        help="Properties of the instruments that nobody is given; all for all of them.",
+    ),
+]
+
+
 def changes_of(assignments: list[str] | None) -> dict[str, Any]:
     """Overrides of ``--set name=value``."""
     changes = {}

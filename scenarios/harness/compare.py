@@ -16,14 +16,23 @@ import numpy as np
 from rich.text import Text
 
 from estimator import ESTIMATORS
+from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import Array, HeadingReference, Measurements
 from scenarios.harness import console
+from scenarios.harness.aboard import flight_code, instruments_of
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.flight import fly_config, fly_scenario
 from scenarios.harness.gate import fly_each
 from scenarios.harness.metrics import Series, heading_error_deg, inclination_error_deg, rms
-from scenarios.harness.plugins import PluginError, heading_reference_of, load_estimator
+from scenarios.harness.plugins import (
+    PluginError,
+    equipped,
+    heading_reference_of,
+    load_estimator,
+    shared_settings,
+    without,
+)
 from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
@@ -32,6 +41,7 @@ from sim.log import Outcome
 
 LETTERS = {"gyro": "G", "accelerometer": "A", "gps": "P", "magnetometer": "M", "airspeed": "V"}
 TIMED_S, TIMED_REPEATS, TIMED_MOST_NS = 4.0, 7, 1_000_000_000
+PREFIX = "estimator_params."
 _UNKNOWN = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")  # of a class that does not say
 
 
@@ -90,6 +100,18 @@ class Entrant:
     cost: Cost | None = None
 
     @property
+    def known(self) -> dict[str, Known]:
+        """What it was given of the instruments; of what it learnt, the median over its flights."""
+        if not self.flights:
+            return {}
+        each = [flown.verdict.known for flown in self.flights]
+        values = {name: [k[name].value for k in each if k[name].source == "learnt"] for name in each[0]}
+        return {
+            name: Known(float(np.median(values[name])), "learnt") if values[name] else entry
+            for name, entry in each[0].items()
+        }
+
+    @property
     def survived(self) -> int:
         """Flights that lasted as long as planned."""
         return sum(f.verdict.outcome == Outcome.COMPLETED for f in self.flights)
@@ -116,6 +138,7 @@ class Entrant:
         return {
             "estimator": self.name,
             "given": list(self.given),
+            "known": to_json(self.known),
             "heading_reference": self.heading_reference,
             "flights": len(self.flights),
             "survived": self.survived,
@@ -135,6 +158,7 @@ class Comparison:
     config: FlightConfig
     seeds: tuple[int, ...]
     entrants: tuple[Entrant, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def whole(self) -> bool:
@@ -158,6 +182,7 @@ class Comparison:
             "scenario": self.scenario.name,
             "seeds": list(self.seeds),
             "estimators": [e.to_json() for e in self.entrants],
+            "notes": list(self.notes),
             "flights": verdicts,
         } | ({} if self.whole else {"interrupted": True})
 
@@ -194,7 +219,8 @@ def checks_text(entrant: Entrant) -> str:
 class Plan:
     """What is to be flown: everything that it names is there.
 
-    named : how the scenario was named (a file may hold it)      references, given : by the estimator's name
+    named : how the scenario was named (a file may hold it)      changes, references, given : by the estimator's name
+    notes : what is set for some of the estimators alone, a line each
     """
 
     named: str
@@ -202,7 +228,8 @@ class Plan:
     config: FlightConfig
     names: tuple[str, ...]
     seeds: tuple[int, ...]
-    changes: Mapping[str, Any]
+    changes: Mapping[str, Mapping[str, Any]]
+    notes: tuple[str, ...]
     references: Mapping[str, HeadingReference]
     given: Mapping[str, tuple[str, ...]]
 
@@ -218,12 +245,17 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
         if name in changes:
             raise ValueError(f"--set {name}={changes[name]}: name what is to be flown with {instead}")
     names = tuple(dict.fromkeys(estimators)) or tuple(name for name in ESTIMATORS if _can_be_loaded(name))
-    configs = [prepared(scenario, {**changes, "estimator": name})[1] for name in names]
-    made = {name: load_estimator(name) for name in names}
+    settings = {key.removeprefix(PREFIX): value for key, value in changes.items() if key.startswith(PREFIX)}
+    shared = {key: value for key, value in changes.items() if not key.startswith(PREFIX)}
+    of_each = shared_settings(names, settings)
+    changes_of = {name: shared | {PREFIX + key: value for key, value in of_each[name].items()} for name in names}
+    configs = [prepared(scenario, {**changes_of[name], "estimator": name})[1] for name in names]
+    made = {name: flight_code(of_it).estimator.code for name, of_it in zip(names, configs, strict=True)}
     console.warn_of_faults(scenario, configs[0])
     references = {name: heading_reference_of(estimator) for name, estimator in made.items()}
     instruments = {name: given(estimator, configs[0]) for name, estimator in made.items()}
-    return Plan(scenario, find(scenario), configs[0], names, tuple(seeds), changes, references, instruments)
+    notes = tuple(without(of_each, settings))
+    return Plan(scenario, find(scenario), configs[0], names, tuple(seeds), changes_of, notes, references, instruments)
 
 
 def _can_be_loaded(name: str) -> bool:
@@ -242,7 +274,7 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None]) -> Compar
     Ctrl-C, or a worker process that was killed, leaves flights out: the comparison is then of those finished.
     """
     # Seed by seed, so that an interruption leaves each estimator about as many flights as the others.
-    tasks = [Task(plan.named, seed, name, plan.changes) for seed in plan.seeds for name in plan.names]
+    tasks = [Task(plan.named, seed, name, plan.changes[name]) for seed in plan.seeds for name in plan.names]
     done = fly_each(tasks, workers, advance, lambda flown: flown.verdict.outcome == Outcome.INTERRUPTED)
     failed = {tasks[i].estimator for i in done if done[i].verdict.outcome == Outcome.ESTIMATOR_FAILED}
     costs = _costs(plan, failed) if len(done) == len(tasks) else {}
@@ -256,7 +288,7 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None]) -> Compar
                 pooled[0] if pooled else None, costs.get(name),
             )
         )  # fmt: skip
-    return Comparison(plan.scenario, plan.config, plan.seeds, tuple(entrants))
+    return Comparison(plan.scenario, plan.config, plan.seeds, tuple(entrants), plan.notes)
 
 
 def given(estimator: object, config: FlightConfig) -> tuple[str, ...]:
@@ -272,12 +304,13 @@ def _costs(plan: Plan, failed: Container[str]) -> dict[str, Cost]:
     config = plan.config.model_copy(update=another)
     rows = fly_config(plan.scenario, config).log.measured
     # The oracle answers in a flight alone.
-    return {name: cost(name, rows) for name in plan.names if name not in failed and name != "oracle"}
+    timed = (name for name in plan.names if name not in failed and name != "oracle")
+    return {name: cost(name, rows, instruments_of(config)) for name in timed}
 
 
-def cost(name: str, rows: np.ndarray) -> Cost:
+def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
     """Least time of several passes over `rows`, per row; a slow one is timed over fewer of them."""
-    estimator, inputs = load_estimator(name), [Measurements(rows, k) for k in range(len(rows))]
+    estimator, inputs = equipped(name, instruments).code, [Measurements(rows, k) for k in range(len(rows))]
 
     def stream() -> None:
         update = estimator.update
@@ -329,6 +362,9 @@ def tell(comparison: Comparison) -> None:
             "dim",
         )
     )
+    for line in comparison.notes:
+        out.print(Text(f"set         {line}"), soft_wrap=True)
+    console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
         for flown in entrant.flights:
             v = flown.verdict

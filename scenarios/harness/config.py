@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from estimator.instruments import PROPERTIES, property_names, property_value
 from scenarios.harness.air_config import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.air_config import parse_wind, resolve_air
 from scenarios.harness.fault_config import require_faults_possible, typed_faults
@@ -127,8 +128,9 @@ class FlightConfig(_Model):
 
     estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
     estimator_params : fields of the estimator's parameter dataclass
-    suits : what is known of the instruments aboard, by the names of such fields, ``{"gps_latency_s": 1.0}``; told to
-    any estimator that has a field of that name
+    instruments : properties of the instruments that the user sets, ``{"gps_latency_s": 1.0}``: they go to every
+    estimator and autopilot that has a parameter of that name, instead of the figures of the suite
+    withheld : names of properties that nobody is told, whatever the suite says
     duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
     changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
     turn_table : the magnetometer was turned on a table before the flight: an estimator that has a parameter
@@ -143,7 +145,8 @@ class FlightConfig(_Model):
     aircraft: str = "endurance"
     estimator: str = "premerlani"
     estimator_params: dict[str, Any] = Field(default_factory=dict)
-    suits: dict[str, float] = Field(default_factory=dict)
+    instruments: dict[str, float | bool] = Field(default_factory=dict)
+    withheld: tuple[str, ...] = ()
     autopilot: str = "dcm"
     duration_s: float = Field(default=60.0, gt=0.0, le=36000.0)
     rates: RatesConfig = Field(default_factory=RatesConfig)
@@ -164,6 +167,16 @@ class FlightConfig(_Model):
     @classmethod
     def _typed_faults(cls, faults: Any) -> Any:
         return typed_faults(faults)
+
+    @field_validator("instruments", mode="before")
+    @classmethod
+    def _known_properties(cls, values: Any) -> Any:
+        return {name: property_value(name, value) for name, value in dict(values).items()}
+
+    @field_validator("withheld", mode="before")
+    @classmethod
+    def _names_of_properties(cls, names: Any) -> Any:
+        return property_names(names.split(",") if isinstance(names, str) else names)
 
     @model_validator(mode="after")
     def _calm_indoors(self) -> "FlightConfig":
@@ -199,7 +212,7 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
     """`config` with fields changed by their dotted names; values may be text, as from a command line.
 
     ``wind`` takes what `parse_wind` takes; ``gps.``, ``gyro.`` and ``accelerometer.`` are short for ``sensors.gps.``
-    and so on.
+    and so on, and the name of a property of the instruments for ``instruments.`` and that name.
 
     Raises
     ------
@@ -230,8 +243,11 @@ def _full_name(name: str, config: FlightConfig) -> str:
     fields = dotted_fields(fitted)
     if name in fields:
         return f"sensors.{name}"
-    open_ended = name.startswith(("estimator_params.", "suits."))  # the estimator's own dataclass checks these
-    known = [*_dotted(config), *(f"sensors.{f}" for f in fields), "wind"]
+    if name in PROPERTIES:
+        return f"instruments.{name}"
+    open_ended = name.startswith("estimator_params.")  # the estimator's own dataclass checks these
+    properties = [f"instruments.{property_}" for property_ in PROPERTIES]
+    known = [*_dotted(config), *properties, *(f"sensors.{f}" for f in fields), "wind"]
     if name not in known and not open_ended:
         require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
         raise ValueError(f"unknown parameter {name!r}: {near_misses(name, [*known, *fields])}")
@@ -246,7 +262,7 @@ def _dotted(config: FlightConfig) -> list[str]:
             names += [f"{name}.{inner}" for inner in type(value).model_fields if inner != "kind"]
         elif name == "manoeuvre":
             names += [f"{name}.{inner}" for inner in value]
-        elif name not in ("sensors", "estimator_params", "suits", "files"):
+        elif name not in ("sensors", "estimator_params", "instruments", "files"):
             names.append(name)
     return names
 

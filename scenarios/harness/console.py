@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+    from estimator.instruments import Known
     from scenarios.harness.checks import Row
     from scenarios.harness.config import FlightConfig
 
@@ -129,6 +130,39 @@ def name_table(title: str, lines: Mapping[str, str]) -> "Table":
     for name, about in lines.items():
         grid.add_row(Text(name), Text(about, "dim"))
     return grid
+
+
+def print_known(known: Mapping[str, Mapping[str, "Known"]]) -> None:
+    """Print what each estimator was given of the instruments, or learnt: `known` by estimator.
+
+    One estimator: a line for each source.  Several: a line for each property, value and source.
+    """
+    import textwrap
+
+    lines: dict[str, list[str]] = {}
+    for estimator, entries in known.items():
+        for name, entry in entries.items():
+            if entry.value is None:
+                lines.setdefault(entry.source, []).append(name)
+            elif len(known) == 1:
+                lines.setdefault(entry.source, []).append(f"{name} {_value(entry)}")
+            else:
+                lines.setdefault(f"{name} {_value(entry)} ({entry.source})", []).append(estimator)
+    lines = {f"{what}:": list(dict.fromkeys(lines[what])) for what in sorted(lines)}
+    indent = 12 * " "
+    for i, (what, texts) in enumerate(lines.items()):
+        wrapped = textwrap.wrap(
+            f"{what} {', '.join(texts)}", WIDTH - 12, subsequent_indent="  ", break_on_hyphens=False
+        )
+        for j, text in enumerate(wrapped):
+            out().print(("known       " if i == j == 0 else indent) + text, style="dim", soft_wrap=True)
+
+
+def _value(entry: "Known") -> str:
+    """A property's value in a few letters."""
+    if isinstance(entry.value, bool):
+        return "yes" if entry.value else "no"
+    return f"{entry.value:.4g}" if isinstance(entry.value, int | float) else str(entry.value)
 
 
 def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Table":

@@ -1,14 +1,13 @@
 """From a configuration to a flight: builds the aeroplane, its air, sensors, estimator and autopilot, and flies."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from estimator.instruments import Instruments, Known
-from estimator.interface import AttitudeEstimator
+from estimator.instruments import to_json
+from scenarios.harness.aboard import flight_code, instruments_of, with_calibration
 from scenarios.harness.air_config import build_air
-from scenarios.harness.compass import with_compass
 from scenarios.harness.config import (
     BenchStart,
     FlightConfig,
@@ -20,7 +19,7 @@ from scenarios.harness.config import (
 )
 from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import equipped, heading_reference_of, load_autopilot
+from scenarios.harness.plugins import Maker, learnt
 from scenarios.harness.scenario import Scenario
 from sim.clock import Rates
 from sim.events import events_of_faults
@@ -31,8 +30,6 @@ from sim.plant import HandThrow, InFlight, Plant, Start
 from sim.power_up import sample_at_rest
 from sim.prescribed_plant import PrescribedPlant, Rest
 from sim.sensors.suite import Suite
-
-Maker = Callable[[], AttitudeEstimator]
 
 
 def fly_scenario(
@@ -73,12 +70,12 @@ def fly_config(
     """Fly `scenario` under `config`, drawing what it leaves to chance.
 
     The resolved configuration is the manifest's ``config``: ``fly_config(scenario, FlightConfig(**that))`` flies
-    the same flight again.
+    the same flight again.  Its ``known`` is what is known of the instruments, its ``known_to_estimator`` what of that
+    the estimator was given, or has learnt.
     """
-    config = resolve(config) if maker is not None else with_compass(resolve(config))
+    config = resolve(config) if maker is not None else with_calibration(resolve(config))
     rates = config.rates.build()
-    estimator = maker() if maker is not None else estimator_of(config)
-    pilot = load_autopilot(config.autopilot, heading_reference_of(estimator), config.aircraft)
+    (estimator, known), (pilot, _) = flight_code(config, maker)
     script = scenario.script(config)
     plant = plant_of(config, rates)
     faults = [parse_fault(fault) for fault in config.faults]
@@ -93,12 +90,18 @@ def fly_config(
         Log.empty(rates.ticks(plant.release_s + config.duration_s)),
         calibration_s=config.calibration_s,
         on_ground=sample_at_rest(sensors, rates, config.seed, config.flight) if airborne else None,
-        manifest={"scenario": scenario.name, "seed": config.seed, "config": config.model_dump(mode="json")},
+        manifest={
+            "scenario": scenario.name,
+            "seed": config.seed,
+            "config": config.model_dump(mode="json"),
+            "known": to_json(instruments_of(config)),
+        },
         watch=watch,
     )
     events = (*flown.events, *events_of_faults(faults, flown), *scenario.events(flown))
     events = tuple(sorted(events, key=lambda event: event.t_s))
-    return replace(flown, events=events)
+    manifest = {**flown.manifest, "known_to_estimator": to_json(learnt(estimator, known))}
+    return replace(flown, events=events, manifest=manifest)
 
 
 def plant_of(config: FlightConfig, rates: Rates) -> Plant:
@@ -147,9 +150,3 @@ def start_of(config: FlightConfig) -> Start:
 def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
     x, y, z = (math.radians(d) for d in degrees)
     return x, y, z
-
-
-def estimator_of(config: FlightConfig) -> AttitudeEstimator:
-    """The estimator by name, its parameters changed as the configuration says."""
-    known = Instruments({name: Known(value, "set") for name, value in config.suits.items()})
-    return equipped(config.estimator, known, config.estimator_params).estimator

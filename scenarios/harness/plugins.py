@@ -18,8 +18,8 @@ import importlib.util
 import inspect
 import sys
 from collections import ChainMap
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import is_dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -28,12 +28,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
 from estimator.instruments import Instruments, Known
-from sim.params import changed
+from sim.params import changed, dotted_fields
 from sim.params import near_misses as near_misses
 
 if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
     from autopilot.interface import Autopilot
     from estimator.interface import AttitudeEstimator, HeadingReference
+
+Maker = Callable[..., Any]  # a class, or a function that makes flight code
 
 # The oracle sees the truth: it is not flight code and not in flight code's own registry.
 _ALL_ESTIMATORS = ChainMap(ESTIMATORS, {"oracle": "sim.oracle:Oracle"})
@@ -66,10 +68,8 @@ def autopilots() -> dict[str, str]:
     return _offered(_AUTOPILOT)
 
 
-def load_estimator(spec: str, **offered: Any) -> "AttitudeEstimator":
-    """A new estimator by name, ``module:Class`` or ``file.py:Class``.
-
-    offered : arguments for a constructor that asks for them by name
+def load_estimator(spec: str) -> "AttitudeEstimator":
+    """A new estimator by name, ``module:Class`` or ``file.py:Class``, that knows nothing of its instruments.
 
     Raises
     ------
@@ -77,58 +77,146 @@ def load_estimator(spec: str, **offered: Any) -> "AttitudeEstimator":
         In one line: nothing of that name (with the near misses), code that cannot be imported or constructed, no
         ``update(measurements)``, or a ``heading_reference`` that is neither "course" nor "nose".
     """
-    estimator = _load(_ESTIMATOR, spec, **offered)
-    reference = heading_reference_of(estimator)
-    if reference not in ("course", "nose"):
-        raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
+    estimator: AttitudeEstimator = _load(_ESTIMATOR, spec)
+    _check_reference(spec, estimator)
     return estimator
 
 
 class Equipped(NamedTuple):
-    """An estimator that knows its instruments, and what it was given of them, by name."""
+    """Flight code that knows its instruments, and what it was given of them, by name."""
 
-    estimator: "AttitudeEstimator"
+    code: Any
     known: dict[str, Known]
 
 
-def equipped(spec: str, instruments: Instruments | None = None, settings: Mapping[str, Any] | None = None) -> Equipped:
-    """A new estimator by name that is given what is known of the instruments, with parameters changed.
+def equipped(
+    spec: "str | Maker", instruments: Instruments | None = None, settings: Mapping[str, Any] | None = None
+) -> Equipped:
+    """A new estimator that is given what is known of the instruments, with parameters changed.
 
-    settings : its parameters by dotted names, as the user sets them: they win over `instruments`
+    Parameters
+    ----------
+    spec            name, ``module:Class``, ``file.py:Class``, a class, or a function that makes one: what that has set
+                    in its parameters is left alone
+    instruments     None is what is assumed where nothing is known
+    settings        parameters by dotted names, as the user sets them: they win over `instruments`
 
     Raises
     ------
     ValueError      in one line: as `load_estimator`; or it has no parameters, none of that name, or refuses a value
     """
-    settings = settings or {}
-    base = instruments if instruments is not None else Instruments()
-    aboard = base.changed({name: value for name, value in settings.items() if name in base})
-    offered = {name: known.value for name, known in aboard.given.items()}
-    asked = _arguments(_find(_ESTIMATOR, spec))
-    estimator = load_estimator(spec, instruments=aboard, **offered)
+    made = _equipped(_ESTIMATOR, spec, instruments or Instruments(), settings or {})
+    _check_reference(spec, made.code)
+    return made
+
+
+def parameters_of(spec: str) -> set[str]:
+    """Names of what can be set of the estimator `spec`: dotted fields of its ``params``, arguments of its constructor.
+
+    Raises
+    ------
+    PluginError      as for `load_estimator`
+    """
+    params = getattr(load_estimator(spec), "params", None)
+    named = set(dotted_fields(params)) if is_dataclass(params) else set()
+    return named | (_arguments(_find(_ESTIMATOR, spec)) - {"params", "instruments", "self"})
+
+
+def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """`settings` for each of several estimators: those that it has, by the estimator's spec.
+
+    A name may begin with that of one estimator, ``premerlani.gps_latency_s``: it is for that one alone.
+
+    Raises
+    ------
+    ValueError      one line: a parameter that none of them has
+    """
+    short = {spec: spec.rpartition(":")[2] for spec in specs}
+    of_each: dict[str, dict[str, Any]] = {spec: {} for spec in specs}
+    has = {spec: parameters_of(spec) for spec in specs} if settings else {}
+    for key, value in settings.items():
+        head, _, rest = key.partition(".")
+        if rest and head in short.values():
+            of_each[next(spec for spec in specs if short[spec] == head)][rest] = value
+            continue
+        takers = [spec for spec in specs if key in has[spec]]
+        if not takers:
+            known = sorted(set().union(*has.values()))
+            who = f"estimator {specs[0]}" if len(specs) == 1 else f"any of {', '.join(specs)}"
+            hint = near_misses(key, known) if known else "they have none"
+            raise ValueError(f"unknown parameter {key!r} of {who}: {hint}")
+        for spec in takers:
+            of_each[spec][key] = value
+    return of_each
+
+
+def without(of_each: Mapping[str, Mapping[str, Any]], settings: Mapping[str, Any]) -> list[str]:
+    """A line for each of the `settings` that some of the estimators do not have, from `shared_settings`."""
+    lines = []
+    for key in settings:
+        takers = [spec for spec, own in of_each.items() if key in own]
+        if takers and len(takers) < len(of_each):
+            others = ", ".join(spec for spec in of_each if spec not in takers)
+            lines.append(f"{key} is set for {', '.join(takers)}; without that parameter: {others}")
+    return lines
+
+
+def equipped_autopilot(
+    spec: str, heading_reference: "HeadingReference", aircraft: str, instruments: Instruments
+) -> Equipped:
+    """A new autopilot by name that is given what is known of the instruments; errors as for `load_autopilot`."""
+    return _equipped(_AUTOPILOT, spec, instruments, {}, heading_reference=heading_reference, aircraft=aircraft)
+
+
+def _equipped(
+    kind: _Kind, spec: "str | Maker", instruments: Instruments, settings: Mapping[str, Any], **also: Any
+) -> Equipped:
+    aboard = instruments.changed({name: value for name, value in settings.items() if name in instruments})
+    values = {name: known.value for name, known in aboard.given.items()}
+    maker = _find(kind, spec) if isinstance(spec, str) else spec
+    asked = _arguments(maker)
+    code = _load(kind, spec, **also, **values, instruments=aboard)
     known = {name: aboard[name] for name in aboard if name in asked or "instruments" in asked}
-    before = getattr(estimator, "params", None)
-    if is_dataclass(before):
-        of_params = {f.name for f in fields(before)} & set(aboard)
-        known |= {name: aboard[name] for name in aboard if name in of_params}
-        values = {name: value for name, value in offered.items() if name in of_params} | dict(settings)
-        if values:
-            estimator = _with_params(estimator, spec, values)
+    params = getattr(code, "params", None)
+    if is_dataclass(params) and inspect.isclass(maker):
+        places = _places(params, aboard)
+        known |= {name: aboard[name] for name in aboard if name in places}
+        changes = {place: values[name] for name, place in places.items() if name in values} | dict(settings)
+        code = _with_params(kind, spec, code, changes, also)
     elif unheard := [name for name in settings if name not in asked]:
         raise ValueError(
-            f"estimator {spec!r} has no parameter {unheard[0]!r}, neither in a dataclass params nor in its constructor"
+            f"{kind.word} {_name_of(spec)!r} has no parameter {unheard[0]!r}: its constructor does not take it, and it "
+            "has no dataclass params"
         )
-    return Equipped(estimator, known)
+    return Equipped(code, known)
 
 
-def _with_params(estimator: "AttitudeEstimator", spec: str, values: Mapping[str, Any]) -> "AttitudeEstimator":
-    """A new estimator like `estimator` with `values` of its parameters; ValueError for one that it refuses."""
-    after = changed(estimator.params, values, f"estimator {spec}")  # type: ignore[attr-defined]
-    maker: Any = type(estimator)
+def _places(params: Any, names: Iterable[str]) -> dict[str, str]:
+    """Those of `names` that are fields of `params` or of a group in it, with their dotted names."""
+    return {name: path for path in dotted_fields(params) if (name := path.rpartition(".")[2]) in set(names)}
+
+
+def _with_params(kind: _Kind, spec: "str | Maker", code: Any, changes: Mapping[str, Any], also: dict[str, Any]) -> Any:
+    """Flight code like `code` with `changes` of its parameters; ValueError for one that it refuses."""
+    if not changes:
+        return code
+    after = changed(code.params, changes, f"{kind.word} {_name_of(spec)}")
+    maker: Any = type(code)
+    asked = _arguments(maker)
     try:
-        return maker(after)
+        return maker(after, **{name: value for name, value in also.items() if name in asked})
     except TypeError as error:
-        raise ValueError(f"estimator {spec!r}: its class must take its params as an argument: {error}") from error
+        raise ValueError(f"{kind.word} {spec!r}: its class must take its params as an argument: {error}") from error
+
+
+def _name_of(spec: "str | Maker") -> str:
+    return spec if isinstance(spec, str) else getattr(spec, "__qualname__", type(spec).__name__)
+
+
+def _check_reference(spec: "str | Maker", estimator: object) -> None:
+    reference = heading_reference_of(estimator)
+    if reference not in ("course", "nose"):
+        raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
 
 
 def learnt(estimator: object, known: Mapping[str, Known]) -> dict[str, Known]:
@@ -162,11 +250,11 @@ def _offered(kind: _Kind) -> dict[str, str]:
     return {**kind.registry, **{name: point.value for name, point in _installed(kind).items()}}
 
 
-def _load(kind: _Kind, spec: str, **offered: Any) -> Any:
+def _load(kind: _Kind, spec: "str | Maker", **offered: Any) -> Any:
     """The object that `spec` names, constructed with those of the `offered` arguments that it asks for, and checked."""
-    what = f"{kind.word} {spec!r}"
+    what = f"{kind.word} {_name_of(spec)!r}"
     try:
-        made = _made(_find(kind, spec), offered)
+        made = _made(_find(kind, spec) if isinstance(spec, str) else spec, offered)
     except PluginError:
         raise
     except Exception as error:  # anything may go wrong in a person's own file: it is their file that is at fault

@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
+from scenarios.harness.aboard import flight_code
 from scenarios.harness.catalogue import aircraft
 from scenarios.harness.config import FlightConfig, override, resolve
-from scenarios.harness.plugins import heading_reference_of, load_autopilot, load_estimator, near_misses
+from scenarios.harness.plugins import near_misses
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 
@@ -21,5 +22,5 @@ def prepared(name: str, changes: Mapping[str, Any]) -> tuple[Scenario, FlightCon
     config = resolve(override(scenario.config, changes))
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
-    load_autopilot(config.autopilot, heading_reference_of(load_estimator(config.estimator)), config.aircraft)
+    flight_code(config)
     return scenario, config

@@ -4,20 +4,21 @@ Each estimator gets all rows in order.  It powers up with the mean inertial samp
 aeroplane was at rest in them, else as in the air; against what an original firmware printed for reference vectors
 always as in the air, as that firmware did.
 
-Judged are the rows with a reference while airborne (GPS ground speed above a limit; all of a log without GPS), after
-a time to settle.  Against firmware every row counts: two runs of one algorithm agree from the first sample on.
+Judged are the rows with a reference while airborne (GPS ground speed above a limit, see `flying`; all rows of a log
+without GPS, or where the limit is 0), after a time to settle.  Against firmware every row counts: two runs of one
+algorithm agree from the first sample on.
 """
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.instruments import Instruments, Known
+from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import Array, AttitudeEstimator, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
 from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
@@ -48,6 +49,7 @@ SCORES = (
     "inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg", "heading_rms_deg",
     "rotation_rms_deg", "rotation_max_deg",
 )  # fmt: skip
+LEAST_FRESH_S, FRESH_FIXES = 2.0, 3.0  # a fix is fresh for so long, or for so many intervals between fixes
 SHARE_S, REPEATS = 0.3, 7  # the time is the least of several runs, while they take no longer than this
 
 
@@ -101,7 +103,7 @@ class Replayed:
             "rejected": self.rejected,
             "refused": dict(self.refused),
             "heading_reference": self.heading_reference,
-            "known": {name: known.to_json() for name, known in self.known.items()},
+            "known": to_json(self.known),
             **failure,
         }
 
@@ -113,9 +115,8 @@ def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None =
     ------
     ValueError      one line: no such estimator or parameter; the oracle, for which no log holds the truth
     """
-    values = {name.removeprefix("estimator_params."): literal(value) for name, value in params.items()}
-    made = equipped(spec, instruments, values)
-    if isinstance(made.estimator, Oracle):
+    made = equipped(spec, instruments, {name: literal(value) for name, value in params.items()})
+    if isinstance(made.code, Oracle):
         raise ValueError("the oracle reads the truth from a simulator: it cannot be replayed over a log")
     return made
 
@@ -125,18 +126,20 @@ def replay(
     spec: str,
     params: Mapping[str, Any] | None = None,
     window: Window | None = None,
+    withheld: Sequence[str] = (),
     advance: console.Advance = lambda _done, _total: None,
 ) -> Replayed:
     """Run the estimator `spec` over `log` and score it.
 
     params : by name; what the log says of its instruments (`RecordedLog.known`) holds where they do not
+    withheld : names of properties of the instruments that it is not given, whatever the log says
 
     Raises
     ------
     ValueError      one line: no such estimator or parameter, or a calibration longer than the log
     """
     window = window or Window()
-    estimator, known = make(spec, params or {}, Instruments(log.known))
+    estimator, known = make(spec, params or {}, Instruments(log.known, withheld=withheld))
     n = _calibration(log, window)
     on_ground = at_rest(log.rows[:n]) if n else None
     first = n if on_ground is not None else 0
@@ -181,18 +184,57 @@ def at_rest(rows: NDArray[Any]) -> ImuSample | None:
 
 def judged_rows(log: RecordedLog, window: Window, first: int = 0) -> NDArray[np.bool_]:
     """Rows that are judged, shape (N,); see the module."""
+    return _judged(log, window, first)[0]
+
+
+def why_none(log: RecordedLog, window: Window, first: int = 0) -> str:
+    """Why no row is judged, in one line; empty where some are."""
+    judged, why = _judged(log, window, first)
+    return "" if judged.any() else why
+
+
+def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bool_], str]:
+    """Rows that are judged, shape (N,), and what left none of them if there are none."""
     rows, reference = log.rows, log.reference
     if reference is None:
-        return np.zeros(len(rows), np.bool_)
+        return np.zeros(len(rows), np.bool_), "the log holds no attitude to score against: --reference FILE"
     judged = reference.known
+    if not judged.any():
+        return judged, f"{reference.name} has no attitude at the times of the log; are their clocks the same?"
     if reference.kind == "firmware":
-        return judged
-    if "gps" in log.instruments:
-        judged &= (rows["gps_valid"] > 0) & (rows["gps_speed_m_s"] > window.airborne_m_s)
+        return judged, ""
+    if "gps" in log.instruments and window.airborne_m_s > 0.0:
+        judged &= flying(rows, window.airborne_m_s)
+        if not judged.any():
+            fastest = float(rows["gps_speed_m_s"][rows["gps_new"] > 0].max(initial=0.0))
+            why = (
+                f"never above {window.airborne_m_s:g} m/s over the ground while there is a reference (the fastest fix: "
+                f"{fastest:.1f} m/s); --airborne 0 judges all rows"
+            )
+            return judged, why
     judged &= np.arange(len(rows)) >= first
     if judged.any():
         judged &= rows["t_s"] > rows["t_s"][np.argmax(judged)] + window.settle_s
-    return judged
+    return judged, f"what could be judged ends within the {window.settle_s:g} s to settle; choose a shorter --settle"
+
+
+def flying(rows: NDArray[Any], airborne_m_s: float) -> NDArray[np.bool_]:
+    """Rows in which the aeroplane flies, by the ground speed of the fixes around them, shape (N,).
+
+    A fix counts until the next one, or while it is fresh.  In a longer silence of the GPS the aeroplane flies where it
+    flew both before and after.
+    """
+    fixes = np.flatnonzero(rows["gps_new"])
+    if not len(fixes):
+        return np.zeros(len(rows), np.bool_)
+    t_s, fast = rows["t_s"], rows["gps_speed_m_s"][fixes] > airborne_m_s
+    interval_s = float(np.median(np.diff(t_s[fixes]))) if len(fixes) > 1 else 0.0
+    fresh_s = max(LEAST_FRESH_S, FRESH_FIXES * interval_s)
+    last = np.searchsorted(fixes, np.arange(len(rows)), side="right") - 1
+    before, after = np.maximum(last, 0), np.minimum(last + 1, len(fixes) - 1)
+    fresh = t_s - t_s[fixes[before]] <= fresh_s
+    resumes = (last + 1 < len(fixes)) & fast[after]
+    return np.asarray((last >= 0) & fast[before] & (fresh | resumes))
 
 
 def score(R_eb: Array, log: RecordedLog, judged: NDArray[np.bool_]) -> dict[str, float]:
@@ -224,6 +266,8 @@ def as_flight(log: RecordedLog, replayed: Replayed, window: Window) -> Flight:
         "reference": reference,
         "instruments": log.instruments,
         "repairs": log.repairs,
+        "ledger": log.ledger.to_json(),
+        "known": to_json(Instruments(log.known)),
         "scores": replayed.to_json(),
         "settle_s": window.settle_s,
         "airborne_m_s": window.airborne_m_s,

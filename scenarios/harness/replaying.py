@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
-from estimator.instruments import Instruments
+from estimator.instruments import Instruments, property_names, to_json
 from scenarios.harness import console, logs, viewing
 from scenarios.harness.logs.recorded import RecordedLog
-from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, make, replay
+from scenarios.harness.plugins import shared_settings, without
+from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, make, replay, why_none
 from sim import recording
 
 _HEADINGS = ("", "inclination\n   RMS    p95    max", "heading\nRMS", "rotation\n   RMS    max", "ns per\nupdate")
@@ -24,17 +25,24 @@ _SHOWN = (
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """A log and what the estimators made of it; `folders` holds their recordings, by name."""
+    """A log and what the estimators made of it.
+
+    folders : their recordings, by name      not_judged : why nothing was judged, empty where something was
+    notes : what was set for some of the estimators alone, a line each
+    """
 
     log: RecordedLog
     judged_s: float
     replays: tuple[Replayed, ...]
     folders: Mapping[str, Path]
+    not_judged: str = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def exit_code(self) -> int:
-        """1 where an estimator failed."""
-        return 1 if any(r.failure for r in self.replays) else 0
+        """1 where an estimator failed, or nothing of the reference could be judged."""
+        nothing = self.log.reference is not None and self.not_judged
+        return 1 if nothing or any(r.failure for r in self.replays) else 0
 
     def to_json(self) -> dict[str, Any]:
         """Every number by its estimator; with one estimator at the top too."""
@@ -47,9 +55,11 @@ class Told:
             "reference": self.log.reference.name if self.log.reference else None,
             "reference_kind": self.log.reference.kind if self.log.reference else None,
             "repairs": list(self.log.repairs),
-            "known": Instruments(self.log.known).to_json(),
+            "known": to_json(Instruments(self.log.known)),
             "ledger": self.log.ledger.to_json(),
             "judged_s": self.judged_s,
+            "not_judged": self.not_judged or None,
+            "notes": list(self.notes),
         }
         each = {r.estimator: r.to_json() | {"recording": str(self.folders[r.estimator])} for r in self.replays}
         alone = next(iter(each.values())) if len(each) == 1 else {}
@@ -65,12 +75,14 @@ def run(
     columns: str | None = None,
     imu: int | None = None,
     params: Mapping[str, Any] | None = None,
+    withheld: Sequence[str] = (),
     window: Window | None = None,
     rerun: bool = True,
 ) -> Told:
     """Read the log at `path`, replay it with each estimator of `names`, record each below the folder `into`.
 
-    params : of all of them, or, as ``premerlani.gps_latency_s``, of one
+    params : of all that have them, or, as ``premerlani.gps_latency_s``, of one
+    withheld : properties of the instruments that no estimator is given; ``all`` are all of them
 
     Raises
     ------
@@ -79,7 +91,8 @@ def run(
     window, params = window or Window(), params or {}
     if len({name.rpartition(":")[2] for name in names}) < len(names):
         raise ValueError(f"--estimator {','.join(names)}: name each one once")
-    of_each = {name: _params_of(name, names, params) for name in names}
+    settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
+    of_each, withheld = shared_settings(names, settings), property_names(withheld)
     for name in names:
         make(name, of_each[name])
     recording.check_writable(into)
@@ -88,7 +101,7 @@ def run(
     replays, folders = [], {}
     for name in names:
         with console.progress(f"replaying {name}", "") as advance:
-            replays.append(replay(log, name, of_each[name], window, advance))
+            replays.append(replay(log, name, of_each[name], window, withheld, advance))
     stem = log.name.partition(".")[0]
     for replayed in replays:
         flight = as_flight(log, replayed, window)
@@ -97,21 +110,10 @@ def run(
         if rerun:
             with console.progress(f"recording {replayed.estimator}", "") as _:
                 viewing.write_rerun(flight, folder)
-    judged = judged_rows(log, window, replays[0].first)
-    return Told(log, float(np.sum(log.rows["dt_s"][judged])), tuple(replays), folders)
-
-
-def _params_of(name: str, names: Sequence[str], params: Mapping[str, Any]) -> dict[str, Any]:
-    """Parameters for the estimator `name`: those for all, and those whose names begin with its own."""
-    shorts, short = [other.rpartition(":")[2] for other in names], name.rpartition(":")[2]
-    found = {}
-    for key, value in params.items():
-        head, _, rest = key.partition(".")
-        if head not in shorts or not rest:
-            found[key] = value
-        elif head == short:
-            found[rest] = value
-    return found
+    first = replays[0].first
+    judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
+    notes = tuple(without(of_each, settings))
+    return Told(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
 
 
 def tell(told: Told) -> None:
@@ -121,19 +123,35 @@ def tell(told: Told) -> None:
     out.print(Text(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}"), soft_wrap=True)
     for line in log.repairs:
         out.print(Text(f"repaired    {line}", "yellow"), soft_wrap=True)
-    if log.reference is None:
-        out.print(Text("no attitude in it to score against: --reference FILE"), soft_wrap=True)
-    else:
+    for line in told.notes:
+        out.print(Text(f"set         {line}"), soft_wrap=True)
+    if len(log.ledger):
+        columns = ("", "read", "used", "left out")
+        out.print(console.table("samples in the log", columns, _books(log), text=(0, 3), wrapping=(3,)))
+    if log.reference is not None:
         out.print(Text(f"against     {log.reference.name}, {told.judged_s:.1f} s of it judged"), soft_wrap=True)
     rows = [_row(replayed) for replayed in told.replays]
     out.print(console.table("differences from the reference, degrees", _HEADINGS, rows))
+    console.print_known({replayed.estimator: replayed.known for replayed in told.replays})
     for replayed in told.replays:
-        if replayed.rejected:
-            out.print(Text(f"{replayed.estimator} rejected something in {replayed.rejected} rows"), soft_wrap=True)
+        if replayed.refused:
+            refused = ", ".join(f"{n} {name}" for name, n in replayed.refused.items())
+            out.print(Text(f"not believed by {replayed.estimator}: {refused} samples"), soft_wrap=True)
         if replayed.failure:
             out.print(Text(f"{replayed.estimator} failed: {replayed.failure}", "bold red"), soft_wrap=True)
+    if told.not_judged:
+        style = "bold red" if log.reference is not None else "yellow"
+        out.print(Text(f"nothing judged: {told.not_judged}", style), soft_wrap=True)
     for folder in told.folders.values():
         out.print(Text(f"recording   {folder}"), soft_wrap=True)
+
+
+def _books(log: RecordedLog) -> list[list[str]]:
+    """Lines of the ledger."""
+    return [
+        [stream, str(entry.read), str(entry.used), ", ".join(f"{n} {reason}" for reason, n in entry.left_out.items())]
+        for stream, entry in log.ledger.items()
+    ]
 
 
 def _row(replayed: Replayed) -> list[str]:
@@ -153,8 +171,3 @@ def _free_folder(into: Path, name: str) -> Path:
             i += 1
         else:
             return path
-
-
-def _short(value: Any) -> str:
-    """A parameter in a few letters."""
-    return value if isinstance(value, str) else f"{value:g}"

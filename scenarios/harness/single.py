@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.text import Text
 
+from estimator.instruments import to_json
 from scenarios.harness import console, viewing
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config
@@ -39,8 +40,8 @@ class Flown:
         return Verdict.of([(self.scenario, self.judged)])
 
     def to_json(self) -> dict[str, Any]:
-        """The verdict, and where the recording lies."""
-        return self._verdict.to_json() | {"recording": str(self.folder)}
+        """The verdict, what the estimator was given of the instruments, and where the recording lies."""
+        return self._verdict.to_json() | {"known": to_json(self.judged.known), "recording": str(self.folder)}
 
 
 def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bool, live: bool, web: bool) -> Flown:
@@ -90,6 +91,7 @@ def tell(flown: Flown) -> None:
     for event in flight.events:
         if event.level == "warn":
             out.print(Text(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow"), soft_wrap=True)
+    console.print_known({judged.estimator: judged.known})
     out.print(Text(f"recording   {flown.folder}\nto see it   wingslevel view {flown.folder}"), soft_wrap=True)
 
 

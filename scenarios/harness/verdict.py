@@ -2,11 +2,12 @@
 
 import json
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 from xml.etree import ElementTree
 
+from estimator.instruments import Known, to_json
 from scenarios.harness.checks import Row
 from scenarios.harness.metrics import summary
 from scenarios.harness.scenario import Scenario
@@ -17,7 +18,10 @@ PASSED, FAILED, SIMULATION_FAILED = 0, 1, 3  # exit codes; 2 is for usage and co
 
 @dataclass(frozen=True, slots=True)
 class FlightVerdict:
-    """One flight judged: which it was, how it ended, its lines, and the numbers told beside them."""
+    """One flight judged: which it was, how it ended, its lines, and the numbers reported beside them.
+
+    known : what the estimator was given of the instruments, or has learnt, by name
+    """
 
     scenario: str
     estimator: str
@@ -27,6 +31,7 @@ class FlightVerdict:
     metrics: dict[str, Any]
     message: str = ""
     flight: int = 0
+    known: Mapping[str, Known] = field(default_factory=dict)
 
     @property
     def passed(self) -> bool:
@@ -52,9 +57,11 @@ class PooledVerdict:
 def judge(scenario: Scenario, flight: Flight) -> FlightVerdict:
     """Verdict on one flight of `scenario`."""
     config = flight.manifest["config"]
+    known = {name: Known.from_json(entry) for name, entry in flight.manifest.get("known_to_estimator", {}).items()}
     return FlightVerdict(
         scenario.name, config["estimator"], config["seed"], flight.outcome,
         tuple(check.judge(flight) for check in scenario.checks), summary(flight), flight.message, config["flight"],
+        known,
     )  # fmt: skip
 
 
@@ -96,6 +103,7 @@ class Verdict:
                     "scenario": v.scenario, "estimator": v.estimator, "seed": v.seed, "flight": v.flight,
                     "outcome": str(v.outcome), "message": v.message, "passed": v.passed,
                     "checks": [plain(row) for row in v.rows], "metrics": v.metrics,
+                    "known": to_json(v.known),
                 }
                 for v in self.flights
             ],

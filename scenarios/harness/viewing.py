@@ -80,10 +80,11 @@ class RealTime:
 
 def live(scenario: str, config: "FlightConfig", *, web: bool) -> RealTime:
     """Start the viewer for a flight to be flown under the resolved `config`; ValueError where it does not start."""
-    from scenarios.harness.plugins import heading_reference_of, load_estimator
+    from scenarios.harness.aboard import flight_code
+    from scenarios.harness.plugins import heading_reference_of
     from sim import rerun_view
 
-    reference = heading_reference_of(load_estimator(config.estimator))
+    reference = heading_reference_of(flight_code(config).estimator.code)
     manifest = {"scenario": scenario, "config": config.model_dump(mode="json")}
     viewer = rerun_view.open_viewer(web=web)
     if viewer.address is not None:

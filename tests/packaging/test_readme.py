@@ -6,10 +6,12 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from estimator import ESTIMATORS
+from estimator.instruments import PROPERTIES, Instruments, Known
 from scenarios.harness import plugins
 from scenarios.harness.cli import run
 from scenarios.harness.compare import LETTERS
@@ -18,8 +20,8 @@ from scenarios.harness.registry import find
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 DOCUMENTS = (
-    "README.md", "CONTRIBUTING.md", "docs/autopilot.md", "docs/claims.md", "docs/recording.md", "docs/replay.md",
-    "docs/reports.md",
+    "README.md", "CONTRIBUTING.md", "docs/autopilot.md", "docs/claims.md", "docs/instruments.md", "docs/recording.md",
+    "docs/replay.md", "docs/reports.md",
 )  # fmt: skip
 
 # Commands that are shown and not run here, each with the reason.
@@ -130,6 +132,31 @@ def test_estimators_page_has_a_row_for_each_with_what_it_uses() -> None:
     for name in ESTIMATORS:
         uses = plugins.load_estimator(name).uses  # type: ignore[attr-defined]
         assert rows[name] == "".join(letter for what, letter in LETTERS.items() if what in uses), name
+
+
+def test_instruments_page_has_a_row_for_each_property_with_what_is_assumed() -> None:
+    """Name, meaning and assumption are those of the record."""
+    page = (ROOT / "docs" / "instruments.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| (.*?) \| (\S*) ?\|$", page, re.M)
+    assert rows == [(name, entry.meaning, _assumed(entry.assumed)) for name, entry in PROPERTIES.items()]
+
+
+def _assumed(value: float | bool | None) -> str:
+    """An assumption as the page has it."""
+    if value is None:
+        return ""
+    return ("no", "yes")[value] if isinstance(value, bool) else f"{value:g}"
+
+
+def test_instruments_page_shows_an_estimator_that_is_given_what_it_asks_for() -> None:
+    """The class of the page, equipped with the sensors of apm2."""
+    (source,) = blocks("python", "docs/instruments.md")
+    shown: dict[str, Any] = {}
+    exec(source, shown)
+    shown["Mine"].update = lambda self, m: None
+    record = Instruments({"gps_latency_s": Known(0.2, "data sheet"), "use_airspeed": Known(True, "data sheet")})
+    mine = plugins.equipped(shown["Mine"], record).code
+    assert (mine.latency_s, mine.has_airspeed) == (0.2, True)
 
 
 def test_documents_link_to_files_that_exist() -> None:

@@ -24,9 +24,9 @@ DATA = Path(__file__).parent / "data" / "ap_ahrs_dcm"
 ORIGINALS = {
     "E100 mag": ("E100_ap2013_mag_nogps_copter", {"fly_forward": False}),
     "A50 mag": ("A50_ap2013_mag", {"declination_rad": np.radians(10.0)}),
-    "A50 gps": ("A50_ap2013_gps", {"use_compass": False}),
+    "A50 gps": ("A50_ap2013_gps", {"use_magnetometer": False}),
     "C50 mag": ("C50_ap2013_mag", {"declination_rad": np.radians(10.0)}),
-    "C50 gps": ("C50_ap2013_gps", {"use_compass": False}),
+    "C50 gps": ("C50_ap2013_gps", {"use_magnetometer": False}),
 }
 
 

@@ -59,7 +59,7 @@ def test_real_flight_inclination_with_airspeed_and_course(flight):
     """2.4 degrees RMS over six minutes, a quarter of them beyond 30 degrees of bank; ground speed alone is worse."""
     inclination, _ = errors_deg(flight)
     assert inclination <= 2.6
-    assert inclination < errors_deg(flight, airspeed=False)[0]
+    assert inclination < errors_deg(flight, use_airspeed=False)[0]
 
 
 def test_real_flight_heading_with_learnt_wind(flight):

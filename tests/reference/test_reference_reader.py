@@ -103,7 +103,7 @@ def test_log_knows_its_receiver_and_how_the_original_was_set():
     measured = {"imu_rate_hz": 50.0, "gps_rate_hz": 5.0, "gps_stamped": False, "gps_vertical_velocity": True}
     assert {name: known.value for name, known in truth.known.items()} == of_set | measured
     original = reference.read(folder / "C50_in.csv.gz", folder / "C50_ap2013_gps.csv.gz")
-    as_set = {"quirks": "JULY_2013", "use_compass": 0.0}
+    as_set = {"quirks": "JULY_2013", "use_magnetometer": False}
     assert {name: known.value for name, known in original.known.items()} == of_set | measured | as_set
     cm_s = 100.0 * original.rows["gps_v_e_m_s"]
     np.testing.assert_allclose(cm_s, np.rint(cm_s), rtol=0, atol=1e-9)

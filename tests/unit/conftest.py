@@ -1,6 +1,10 @@
 """A short flight on prescribed curves, as an autopilot would log it: each instrument at times of its own."""
 
+import importlib.util
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -10,13 +14,14 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.interface import MEASURED_DTYPE
+from scenarios.harness import logs
 from scenarios.harness.logs.recorded import RecordedLog, Reference
 
 PLACE = 47.4, 8.5, 488.0
 FIELD_E_UT = np.array([21.5, 1.2, 43.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LoggedFlight:
     """Inertial samples at 50 Hz, and what else was measured, at times (microseconds) between their ticks,
     and those of the air on ticks.
@@ -38,8 +43,8 @@ class LoggedFlight:
     airspeed: NDArray[Any]
     height: NDArray[Any]
 
-    def expected(self) -> NDArray[Any]:
-        """The rows that a reader should make of it, filled by walking along it."""
+    def expected(self, *, stamped: bool = True) -> NDArray[Any]:
+        """The rows that a reader should make of it, filled by walking along it; `stamped`: with times of the fixes."""
         rows = np.zeros(len(self.t_us), MEASURED_DTYPE)
         rows["t_s"], rows["dt_s"] = self.t_us / 1e6, 0.02
         rows["gyro_b_rad_s"], rows["force_b_m_s2"] = self.rate, self.force
@@ -48,7 +53,7 @@ class LoggedFlight:
             for i in np.flatnonzero((self.fix_us > t_us - 20_000) & (self.fix_us <= t_us)):
                 n, e, _ = self.v_e[i]
                 rows["gps_new"][k], rows["gps_valid"][k:] = 1, 1
-                rows["gps_t_s"][k:] = self.fix_us[i] / 1e6
+                rows["gps_t_s"][k:] = self.fix_us[i] / 1e6 if stamped else np.nan
                 rows["gps_p_e_m"][k:], rows["gps_v_e_m_s"][k:] = self.p_e[i] - self.p_e[0], self.v_e[i]
                 rows["gps_course_rad"][k:], rows["gps_speed_m_s"][k:] = np.arctan2(e, n) % (2 * np.pi), np.hypot(n, e)
             for i in np.flatnonzero((self.field_us > t_us - 20_000) & (self.field_us <= t_us)):
@@ -151,3 +156,56 @@ class HandHeld:
 def held() -> HandHeld:
     """A motion as columns."""
     return HandHeld()
+
+
+def _beside(name: str) -> ModuleType:
+    """The test module of that name: test folders are no packages, from which it could be imported."""
+    spec = importlib.util.spec_from_file_location(f"_{name}", Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def dataflash() -> ModuleType:
+    """The writer of ArduPilot's logs, and a flight in its words: Writer, TODAY, messages."""
+    return _beside("test_log_dataflash")
+
+
+@pytest.fixture(scope="session")
+def px4() -> ModuleType:
+    """The writer of PX4's logs, and a flight in its words: framed, ulog, TODAY, messages."""
+    return _beside("test_log_ulog")
+
+
+@pytest.fixture
+def read_back(tmp_path: Path) -> Callable[..., RecordedLog]:
+    """Writes pieces of bytes to a log of that name and reads it; its ledger must add up."""
+
+    def _read_back(pieces: list[bytes], name: str, **options: Any) -> RecordedLog:
+        path = tmp_path / name
+        path.write_bytes(b"".join(pieces))
+        log = logs.read(path, **options)
+        demand_books_agree(log)
+        return log
+
+    return _read_back
+
+
+def demand_books_agree(log: RecordedLog) -> None:
+    """Demand that everything read is used or left out, and that what is used is what the rows hold."""
+    for stream, entry in log.ledger.items():
+        assert entry.read == entry.used + sum(entry.left_out.values()), (stream, entry)
+        assert min(entry.read, entry.used, *entry.left_out.values()) >= 0, (stream, entry)
+    assert log.ledger["imu"].used == len(log.rows)
+    for stream, new in (("gps", "gps_new"), ("magnetometer", "mag_new"), ("airspeed", "air_new")):
+        used = log.ledger[stream].used if stream in log.ledger else 0
+        assert used == np.count_nonzero(log.rows[new])
+
+
+@pytest.fixture(scope="session")
+def demand_agreement() -> Any:
+    """`demand_books_agree`, for tests."""
+    return demand_books_agree

@@ -1,6 +1,7 @@
 """`ap_dcm` on prescribed motion: what each option and each quirk does, and that nothing takes it off the rotations."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from estimator.ap_dcm import JULY_2013, STATE_DTYPE, ApDcm, ApDcm2013, ApDcmParams, Quirk, spin_gain
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
+from scenarios.harness.plugins import equipped
 from scenarios.harness.replay import make
 
 G_M_S2 = 9.80665
@@ -111,14 +113,29 @@ def test_declination_turns_the_compass():
     assert heading_error_rad(run(rows, fly_forward=False)["R_eb"][-1], truth[-1]) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_use_compass_off_takes_the_course():
+def test_use_magnetometer_off_takes_the_course():
     """In 4 m/s of crosswind nose and course are 15 degrees apart; without compass the heading is the course."""
     rows, truth = straight(20, wind_e_m_s=(0.0, 4.0, 0.0), compass=True)
     crab = np.degrees(np.arctan2(4.0, 15.0))
     by_compass = heading_error_rad(run(rows)["R_eb"][-1], truth[-1])
-    by_course = heading_error_rad(run(rows, use_compass=False)["R_eb"][-1], truth[-1])
+    by_course = heading_error_rad(run(rows, use_magnetometer=False)["R_eb"][-1], truth[-1])
     assert np.degrees(by_compass) == pytest.approx(0.0, abs=0.5)
     assert np.degrees(by_course) == pytest.approx(crab, abs=0.5)
+
+
+@pytest.mark.parametrize(("fitted", "reference"), [(True, "nose"), (False, "course"), (None, "course")])
+@pytest.mark.parametrize("cls", [ApDcm, ApDcm2013])
+def test_heading_reference_is_the_nose_where_a_magnetometer_is_known_to_be_fitted(cls, fitted, reference):
+    """It is judged by it: by the nose with a compass, by the course without one and where nobody knows."""
+    assert cls(replace(cls().params, use_magnetometer=fitted)).heading_reference == reference
+
+
+@pytest.mark.parametrize("value", [0.0, False, 1.0, True])
+def test_use_magnetometer_as_a_record_or_a_command_line_has_it(value):
+    """Numbers for truth values: what is known of the instruments comes from files as well."""
+    estimator = equipped("ap_dcm", settings={"use_magnetometer": value}).estimator
+    assert estimator.params.use_magnetometer is bool(value)
+    assert estimator.snapshot()["use_magnetometer"][0] == int(value)
 
 
 def test_without_gps_tilt_comes_back_with_the_gain():
@@ -258,8 +275,8 @@ def test_quirks_can_be_typed_and_the_original_takes_settings():
     assert ApDcmParams(quirks="JULY_2013").quirks == JULY_2013
     assert ApDcmParams(quirks="").quirks == frozenset()
     assert ApDcm2013().params == ApDcmParams(quirks=JULY_2013)
-    assert make("ap_dcm_2013", {"kp": "0.2"}).params == ApDcmParams(quirks=JULY_2013, kp=0.2)
-    assert make("ap_dcm", {"quirks": "vertical_clip"}).params.quirks == {Quirk.VERTICAL_CLIP}
+    assert make("ap_dcm_2013", {"kp": "0.2"}).estimator.params == ApDcmParams(quirks=JULY_2013, kp=0.2)
+    assert make("ap_dcm", {"quirks": "vertical_clip"}).estimator.params.quirks == {Quirk.VERTICAL_CLIP}
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,9 @@ def test_replay_of_a_table_by_a_column_map_with_parameters(here: Path, capfd) ->
     units |= {f"f{i}": f"force.{a}" for i, a in enumerate("xyz")} | {n: n for n in columns if re.match(r"r\d\d", n)}
     rows = [",".join(columns), *(",".join(map(repr, row)) for row in np.column_stack(list(columns.values())).tolist())]
     (here / "own.csv").write_text("\n".join(rows))
-    (here / "own.toml").write_text("\n".join(["[columns]", *(f'{n} = "{unit}"' for n, unit in units.items())]))
+    receiver = ["[instruments]", "gps_filter_s = 1.0", "gps_latency_s = 0.3"]
+    columns_ = ["[columns]", *(f'{n} = "{unit}"' for n, unit in units.items())]
+    (here / "own.toml").write_text("\n".join(columns_ + receiver))
     capfd.readouterr()
     found = []
     for arguments in (

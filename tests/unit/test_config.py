@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from scenarios.harness.aboard import instruments_of
 from scenarios.harness.air_config import Wind, parse_wind
 from scenarios.harness.config import (
     AirConfig,
@@ -18,7 +19,7 @@ from scenarios.harness.config import (
     resolve,
 )
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.flight import estimator_of
+from scenarios.harness.plugins import equipped
 from sim.clock import Rates
 from sim.params import changed
 from sim.sensors.suite import SUITES
@@ -227,13 +228,43 @@ def test_heading_before_it_is_drawn_is_refused():
         _ = FlightConfig(start=InFlightStart()).heading_deg
 
 
-def test_what_suits_the_instruments_is_told_to_whoever_has_a_parameter_for_it():
-    """And to nobody else; a parameter that is set by name is stronger."""
-    config = override(CROSS, {"suits.gps_latency_s": "3", "duration_s": "0.1"})
-    assert config.suits == {"gps_latency_s": 3.0}
-    assert estimator_of(config).params.gps_latency_s == 3.0
-    assert estimator_of(override(config, {"estimator": "ins_ekf"})).params.gps_latency_s == 3.0
-    assert estimator_of(override(config, {"estimator_params.gps_latency_s": 1.0})).params.gps_latency_s == 1.0
-    assert not hasattr(estimator_of(override(config, {"estimator": "gyro_only"})), "params")
-    with pytest.raises(ValueError, match=r"suits.gps_latency_s = 'soon'"):
-        override(CROSS, {"suits.gps_latency_s": "soon"})
+def given(config, estimator, **settings):
+    """The estimator of that name as it flies under `config`."""
+    return equipped(estimator, instruments_of(resolve(config)), settings)
+
+
+@pytest.mark.parametrize("name", ["instruments.gps_latency_s", "gps_latency_s"])
+def test_property_that_is_set_reaches_whoever_has_a_parameter_for_it(name):
+    """And nobody else; a parameter that is set by its own name is stronger."""
+    config = override(CROSS, {name: "3", "duration_s": "0.1"})
+    assert config.instruments == {"gps_latency_s": 3.0}
+    for estimator in ("premerlani", "gps_velocity", "ins_ekf"):
+        made = given(config, estimator)
+        assert made.code.params.gps_latency_s == 3.0
+        assert made.known["gps_latency_s"] == (3.0, "set", "")
+    assert given(config, "premerlani", gps_latency_s=1.0).code.params.gps_latency_s == 1.0
+    assert given(config, "gyro_only").known == {}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"instruments.gps_latency_s": "soon"}, "gps_latency_s = 'soon': must be a number"),
+        ({"instruments.gps_latency_s": -1}, "gps_latency_s = -1: must be a number, zero or more"),
+        ({"instruments.gps_stamped": "perhaps"}, "gps_stamped = 'perhaps': must be true or false"),
+        ({"instruments.gps_latensy_s": 1}, "did you mean .*gps_latency_s"),
+        ({"withheld": "gps_latensy_s"}, "did you mean gps_latency_s"),
+    ],
+)
+def test_property_that_cannot_be_is_refused(changes, words):
+    """In one line that names the property."""
+    with pytest.raises(ValueError, match=words):
+        override(CROSS, changes)
+
+
+def test_property_that_is_withheld_is_assumed_and_says_so():
+    """Nobody is told the 12 s of this receiver; what is set wins over what is withheld."""
+    config = override(CROSS, {"gps.latency_s": 12.0, "withheld": "gps_latency_s"})
+    assert given(config, "premerlani").known["gps_latency_s"] == (0.3, "withheld", "")
+    assert instruments_of(resolve(override(config, {"withheld": ""})))["gps_latency_s"].value == 12.0
+    assert instruments_of(resolve(override(config, {"gps_latency_s": 1})))["gps_latency_s"].source == "set"

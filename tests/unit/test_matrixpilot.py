@@ -168,6 +168,29 @@ def test_yaw_meets_the_velocity_through_the_air_once_the_wind_is_known():
     assert heading_rad(without.replay(rows)["R_eb"][-1]) == pytest.approx(course, rel=0, abs=math.radians(1.0))
 
 
+def test_climb_from_height_is_the_change_between_two_reports():
+    """Heights 0.5 m lower at every report, 4 Hz: 2 m/s of sink; the first report has no earlier height, and none."""
+    rows = with_gps(motion(2.0), [12.0, 0.0, 0.0])
+    rows["gps_p_e_m"][:, 2] = -80.0 + 2.0 * rows["t_s"]
+    estimator = MatrixPilot(MatrixPilotParams(climb_from_height=True, late_by_one_report=False))
+    estimator.replay(rows[:GPS_TICKS])
+    assert estimator.snapshot()["v_e_m_s"][0, 2] == 0.0
+    estimator.replay(rows[GPS_TICKS : 2 * GPS_TICKS])
+    np.testing.assert_allclose(estimator.snapshot()["v_e_m_s"][0], [12.0, 0.0, 2.0], rtol=0, atol=1e-9)
+
+
+def test_climb_from_height_refuses_a_fix_without_one():
+    """A height of NaN makes a fix none where the sink rate comes from it; else it is not looked at."""
+    rows = with_gps(motion(2.0), [12.0, 0.0, 0.0])
+    rows["gps_p_e_m"][:, 2] = np.nan
+    counted = {}
+    for from_height in (True, False):
+        estimator = MatrixPilot(MatrixPilotParams(climb_from_height=from_height))
+        estimator.replay(rows)
+        counted[from_height] = estimator.refused
+    assert counted == {True: {"gps": 8}, False: {}}
+
+
 def test_yaw_error_decays_as_the_linear_loop():
     """A nose 5 degrees off: e'' + k_p e' + k_i e = 0, less the hold of a quarter second."""
     rows = with_gps(motion(20.0), [15.0, 0.0, 0.0])

@@ -167,10 +167,12 @@ class _Gain:
 class _TakesNothing:
     params = _Gain()
 
+    def update(self, m):
+        """Nothing: never flown."""
 
-def test_with_params_of_a_class_that_takes_none_is_one_line():
-    """A person's own class with parameters that it cannot be given is told what is missing."""
-    with pytest.raises(ValueError, match=r"estimator 'mine': its class must take its params as an argument"):
-        plugins.with_params(_TakesNothing(), "mine", {"gain": 2.0})
-    mine = _TakesNothing()
-    assert plugins.with_params(mine, "mine", {}) is mine
+
+def test_parameters_of_a_class_that_takes_none_are_refused_in_one_line():
+    """A person's own class has parameters that it cannot be given."""
+    with pytest.raises(ValueError, match=r"its class must take its params as an argument"):
+        plugins.equipped(_TakesNothing, settings={"gain": 2.0})
+    assert plugins.equipped(_TakesNothing).code.params.gain == 1.0

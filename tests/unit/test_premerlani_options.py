@@ -68,14 +68,35 @@ def tilt_deg(estimates, R):
 def test_clipped_axis_of_a_pull_up_does_not_steer_the_pitch(load):
     """Clipped at 2 g, the reference of gravity is that much too short downwards, and level is not where it was."""
     rows, R = pulled_up(50, load, limit=2.0 * G_M_S2)
-    options = {"known": {"clip_m_s2": 1.99 * G_M_S2}, "found": {"find_clip": True}, "ignored": {}}
+    options = {
+        "known": {"force_full_scale_m_s2": 2.0 * G_M_S2},
+        "set": {"clip_m_s2": 1.98 * G_M_S2},
+        "found": {"find_clip": True},
+        "ignored": {},
+    }
     tilt = {
         name: tilt_deg(power_up(np.eye(3), launch_gate=math.inf, w_rp=1.0, **params).replay(rows), R).max()
         for name, params in options.items()
     }
     assert tilt["known"] < 0.5
+    assert tilt["set"] == pytest.approx(tilt["known"], rel=0, abs=1e-12)
     assert tilt["found"] < 1.5  # the first clipped reading still steers: 20 ms at W_RP = 1 / s and 0.9 of error
     assert tilt["ignored"] > 5.0
+
+
+@pytest.mark.parametrize(
+    ("params", "limit_m_s2"),
+    [
+        ({}, math.inf),
+        ({"force_full_scale_m_s2": 30.0}, 29.7),
+        ({"force_full_scale_m_s2": 30.0, "clip_m_s2": 25.0}, 25.0),
+        ({"clip_m_s2": 25.0}, 25.0),
+    ],
+)
+def test_clip_level_follows_from_the_full_scale_unless_it_is_set(params, limit_m_s2):
+    """Known of the part, 1 % below its end; set by hand, as set; neither, never."""
+    estimator = power_up(np.eye(3), **params)
+    assert estimator.snapshot()["clip_m_s2"][0] == pytest.approx(limit_m_s2, rel=0, abs=1e-12)
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -121,18 +142,30 @@ def test_airspeed_takes_the_place_of_ground_speed_in_a_turn_in_wind():
     rows, R = circling(40.0, (0.0, 0.0))
     rows["gps_speed_m_s"] += 5.0
     rows["air_new"][::5], rows["airspeed_m_s"] = 1, SPEED
-    on, off = (tilt_deg(power_up(R[0], airspeed=use, k_i=0.0).replay(rows), R)[-1] for use in (True, False))
+    on, off = (tilt_deg(power_up(R[0], use_airspeed=use, k_i=0.0).replay(rows), R)[-1] for use in (True, False))
     assert on < 0.1
     assert off > 5.0
 
 
-@pytest.mark.parametrize("reading", [math.nan, -1.0, 0.0, math.inf])
+@pytest.mark.parametrize("reading", [math.nan, -1.0, 0.0])
 def test_airspeed_that_is_none_changes_nothing(reading):
     """A barometer alone, a blocked tube: the GPS goes on giving the speed."""
     rows, R = circling(10.0, (0.0, 0.0))
     without = power_up(R[0]).replay(rows)
     rows["air_new"], rows["airspeed_m_s"] = 1, reading
     assert power_up(R[0]).replay(rows).tobytes() == without.tobytes()
+
+
+def test_airspeed_of_no_size_is_refused_and_changes_no_attitude():
+    """An infinite airspeed is counted for every sample, the health is poor, and the GPS goes on giving the speed."""
+    rows, R = circling(10.0, (0.0, 0.0))
+    without = power_up(R[0]).replay(rows)
+    rows["air_new"], rows["airspeed_m_s"] = 1, math.inf
+    estimator = power_up(R[0])
+    got = estimator.replay(rows)
+    np.testing.assert_array_equal(got["R_eb"], without["R_eb"])
+    assert estimator.refused == {"airspeed": len(rows)}
+    assert np.all(got["health"] == Health.POOR)
 
 
 def test_airspeed_lost_in_flight_gives_way_to_ground_speed():
@@ -204,6 +237,8 @@ def test_w_y_until_lock_finds_the_heading_sooner_and_is_gone_after():
     ("params", "message"),
     [
         ({"clip_m_s2": 9.8}, "clip_m_s2 is 9.8 m/s"),
+        ({"force_full_scale_m_s2": 9.8}, "force_full_scale_m_s2 is 9.8 m/s.2; gravity is felt"),
+        ({"force_full_scale_m_s2": math.nan}, "force_full_scale_m_s2 is nan"),
         ({"clip_m_s2": math.nan}, "clip_m_s2 is nan"),
         ({"w_y_until_lock": -1.0}, "w_y_until_lock is -1.0"),
         ({"learn_wind": True, "rotate_history": False}, "learn_wind is on and rotate_history off"),

@@ -14,7 +14,7 @@ from estimator.screening import CLOCK_BACK_S, COAST_S
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 SANE = st.floats(-40.0, 40.0)
 NUMBER = st.one_of(SANE, SANE, SANE, ANY)
-SWITCHES = ("gps_lag_filter", "rotate_history", "find_clip", "airspeed", "turn_speed", "learn_wind")
+SWITCHES = ("gps_lag_filter", "rotate_history", "find_clip", "use_airspeed", "turn_speed", "learn_wind")
 ROW = st.fixed_dictionaries(
     {
         "step_s": st.one_of(st.just(0.02), st.floats(-2.0, 2.0), ANY),  # of the clock since the row before
@@ -185,7 +185,7 @@ ALL_KINDS = [
     PremerlaniParams(),
     PremerlaniParams(gps_lag_filter=False, turn_speed=True),
     PremerlaniParams(learn_wind=True, find_clip=True, w_y_until_lock=3.0),
-    PremerlaniParams(rotate_history=False, airspeed=False, clip_m_s2=20.0, launch_gate=math.inf),
+    PremerlaniParams(rotate_history=False, use_airspeed=False, clip_m_s2=20.0, launch_gate=math.inf),
 ]
 
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate
-from estimator.premerlani import Premerlani
+from estimator.premerlani import Premerlani, PremerlaniParams
 from scenarios.harness import logs
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.logs.recorded import RecordedLog, Reference
 from scenarios.harness.registry import find
-from scenarios.harness.replay import Window, as_flight, at_rest, judged_rows, make, replay, score
+from scenarios.harness.replay import Window, as_flight, at_rest, flying, judged_rows, make, replay, score, why_none
 from sim import recording
 from sim.log import Outcome
 
@@ -27,8 +28,8 @@ class Called:
 
     heading_reference = "course"
 
-    def __init__(self):
-        self._dcm = Premerlani()
+    def __init__(self, gps_filter_s, gps_latency_s):
+        self._dcm = Premerlani(PremerlaniParams(gps_filter_s=gps_filter_s, gps_latency_s=gps_latency_s))
         self.reset = self._dcm.reset
 
     def update(self, m):
@@ -86,10 +87,12 @@ def test_replay_called_row_by_row_is_the_same(flights):
 
 def test_replay_parameters_reach_the_estimator(flights):
     """Changed by name, as text; unknown ones are refused with those that come near."""
-    assert make("premerlani", {"gps_latency_s": "0.6", "turn_speed": "true"}).params.turn_speed is True
+    made = make("premerlani", {"gps_latency_s": "0.6", "turn_speed": "true"})
+    assert made.code.params.turn_speed is True
+    assert made.known["gps_latency_s"] == (0.6, "set", "")
     with pytest.raises(ValueError, match="unknown parameter 'gps_lateny_s' of estimator premerlani: did you mean gps"):
         make("premerlani", {"gps_lateny_s": "0.6"})
-    with pytest.raises(ValueError, match="has no parameters"):
+    with pytest.raises(ValueError, match="has no parameter 'gain'"):
         make("gyro_only", {"gain": "1"})
     with pytest.raises(ValueError, match="oracle reads the truth"):
         make("oracle", {})
@@ -98,7 +101,9 @@ def test_replay_parameters_reach_the_estimator(flights):
 def test_replay_takes_what_the_log_says_of_its_instruments(flights):
     """Where the estimator has such a parameter, and nobody says otherwise."""
     _, log = flights[AIR]
-    knows = replace(log, suits={"gps_latency_s": 1.0, "no_parameter_of_anything": 3.0})
+    assert set(log.known) >= {"gps_filter_s", "gps_latency_s", "gps_stamped", "imu_rate_hz"}
+    own = Known(1.0, "log")
+    knows = replace(log, known={**log.known, "gps_latency_s": own, "no_parameter_of_anything": own})
     told = replay(log, "premerlani", {"gps_latency_s": 1.0})
     found = replay(knows, "premerlani")
     assert found.scores == told.scores
@@ -107,12 +112,14 @@ def test_replay_takes_what_the_log_says_of_its_instruments(flights):
     assert not replay(knows, "gyro_only").failure
 
 
-def test_replay_of_our_recording_tells_what_the_flight_was_told(tmp_path):
-    """A receiver known to be 3 s late in flight is known to be in replay."""
-    recording.save(fly_scenario(find("gps_latency_told_3"), {"duration_s": 1.0}), tmp_path / "late")
+@pytest.mark.parametrize(("scenario", "entry"), [("told_3", (3.0, "data sheet")), ("s_3", (0.3, "withheld"))])
+def test_replay_of_our_recording_knows_what_was_known_in_flight(tmp_path, scenario, entry):
+    """A receiver known to be 3 s late in flight is known to be in replay; what was withheld stays so."""
+    recording.save(fly_scenario(find(f"gps_latency_{scenario}"), {"duration_s": 1.0}), tmp_path / "late")
     log = logs.read(tmp_path / "late")
-    assert log.suits == {"gps_latency_s": 3.0}
-    assert replay(log, "premerlani").scores == replay(log, "premerlani", {"gps_latency_s": 3.0}).scores
+    assert log.known["gps_latency_s"][:2] == entry
+    assert replay(log, "premerlani").known["gps_latency_s"][:2] == entry
+    assert replay(log, "premerlani", withheld=["gps_latency_s"]).known["gps_latency_s"][:2] == (0.3, "withheld")
 
 
 def test_replay_of_an_estimator_that_fails_says_so_and_is_recorded(flights, tmp_path):
@@ -157,8 +164,35 @@ def test_judged_are_airborne_rows_after_settling():
     log = RecordedLog(rows, "log", ("gyro", "accelerometer", "gps"), Reference(R_eb, "truth", "t"))
     judged = np.flatnonzero(judged_rows(log, Window(settle_s=2.0)))
     assert judged.tolist() == [k for k in range(301, 800) if k != 600]
+    assert why_none(log, Window(settle_s=2.0)) == ""
     assert not judged_rows(log, Window(airborne_m_s=13.0)).any()
+    assert "the fastest fix: 12.0 m/s" in why_none(log, Window(airborne_m_s=13.0))
     assert not judged_rows(replace(log, reference=None), Window()).any()
+    assert "no attitude" in why_none(replace(log, reference=None), Window())
+    assert "within the 100 s to settle" in why_none(log, Window(settle_s=100.0))
+    elsewhere = replace(log, reference=replace(log.reference, R_eb=np.full((1000, 3, 3), np.nan)))
+    assert "are their clocks the same?" in why_none(elsewhere, Window())
+
+
+def test_judged_with_a_limit_of_zero_are_all_rows_even_at_a_speed_of_exactly_zero():
+    """On a bench with a GPS nothing moves."""
+    log = RecordedLog(rest(), "log", ("gyro", "gps"), Reference(np.tile(np.eye(3), (200, 1, 1)), "truth", "t"))
+    assert not judged_rows(log, Window(settle_s=1.0)).any()
+    assert judged_rows(log, Window(airborne_m_s=0.0, settle_s=1.0)).sum() == 200 - 51
+
+
+def test_flying_after_the_last_fix_lasts_as_long_as_a_fix_is_fresh():
+    """A GPS lost in flight says nothing of the ground after it; a gap between two fast fixes is flight."""
+    rows = rest(3000)
+    rows["gps_new"] = 0
+    rows["gps_new"][[*range(0, 500, 10), *range(1500, 2000, 10)]] = 1
+    rows["gps_speed_m_s"] = 12.0
+    expected = np.zeros(3000, np.bool_)
+    expected[: 1990 + 101] = True  # 2 s after the last fix
+    np.testing.assert_array_equal(flying(rows, 5.0), expected)
+    rows["gps_speed_m_s"][1500:] = 0.0  # it landed in the silence
+    expected[490 + 101 :] = False
+    np.testing.assert_array_equal(flying(rows, 5.0), expected)
 
 
 def test_judged_are_all_rows_without_gps_after_settling_and_all_against_firmware():

@@ -42,10 +42,10 @@ def turning(rate_rad_s, n):
 
 
 def at(R, params=None):
-    """An estimator that believes `R`."""
+    """An estimator that believes `R`, its heading too."""
     estimator = Starlino(params)
     state = estimator.snapshot()
-    state["R_eb"], state["dcm"] = R, NWU @ R
+    state["R_eb"], state["dcm"], state["aligned"] = R, NWU @ R, 1
     estimator.restore(state)
     return estimator
 
@@ -72,7 +72,7 @@ def test_gyro_with_the_printed_sign_turns_backwards_and_negated_forwards():
     R, omega = turning(math.radians(45.0), 100)
     rows = rows_of(R, omega)
     as_printed, as_mended = (printed(np.eye(3), rows, sign, s_a=0.0) for sign in (1.0, -1.0))
-    ours = Starlino(StarlinoParams(magnetometer=False)).replay(rows)["R_eb"][-1]
+    ours = Starlino(StarlinoParams(use_magnetometer=False)).replay(rows)["R_eb"][-1]
     # First order in the step of 0.9 degrees: the angle comes out short by a third of its square, 8e-5.
     assert math.degrees(heading_rad(as_printed)) == pytest.approx(-90.0, rel=0, abs=0.01)
     assert math.degrees(heading_rad(as_mended)) == pytest.approx(90.0, rel=0, abs=0.01)
@@ -83,7 +83,7 @@ def test_one_mean_over_all_weights_as_printed_loses_a_twenty_first_of_a_turn():
     """The accelerometer is blind to a turn about the vertical: divided by its weight too, 90 degrees become 85.7."""
     R, omega = turning(math.radians(45.0), 100)
     rows = rows_of(R, omega)
-    ours = Starlino(StarlinoParams(magnetometer=False)).replay(rows)["R_eb"][-1]
+    ours = Starlino(StarlinoParams(use_magnetometer=False)).replay(rows)["R_eb"][-1]
     assert math.degrees(heading_rad(printed(np.eye(3), rows))) == pytest.approx(90.0 * 20.0 / 21.0, rel=0, abs=0.01)
     assert math.degrees(heading_rad(ours)) == pytest.approx(90.0, rel=0, abs=0.01)
 
@@ -155,7 +155,7 @@ def test_tilt_error_decays_by_a_twenty_first_in_every_sample():
 def test_gyro_offset_is_outweighed_and_never_learnt():
     """No integral: an offset b leaves the tilt b dt s_g / s_a for ever, and the heading runs away."""
     b = math.radians(0.5)
-    got = Starlino(StarlinoParams(magnetometer=False)).replay(still(np.eye(3), 1000, omega_b=(b, 0.0, b)))
+    got = Starlino(StarlinoParams(use_magnetometer=False)).replay(still(np.eye(3), 1000, omega_b=(b, 0.0, b)))
     last = got[-1]
     assert float(inclination_error_rad(last["R_eb"], np.eye(3))) == pytest.approx(20.0 * b * DT, rel=0.01)
     assert float(heading_rad(last["R_eb"])) == pytest.approx(1000 * b * DT, rel=0.01)
@@ -187,7 +187,7 @@ def test_magnetometer_brings_true_north_and_calibration_takes_iron_off(declinati
 def test_without_magnetometer_asked_for_its_samples_change_nothing():
     """6-DOF is bit for bit the same with and without samples."""
     R, omega = turning(0.3, 200)
-    form = StarlinoParams(magnetometer=False)
+    form = StarlinoParams(use_magnetometer=False)
     with_samples, without = (Starlino(form).replay(rows_of(R, omega, every=every)) for every in (5, 0))
     assert with_samples.tobytes() == without.tobytes()
 
@@ -196,7 +196,7 @@ def test_without_magnetometer_asked_for_its_samples_change_nothing():
 def test_field_that_cannot_be_is_rejected_and_counted(field):
     """Not a number, or the overflow count of the part: the sample is dropped, the tick counted, the health poor."""
     rows = still(np.eye(3), 10, every=1)
-    clean = Starlino(StarlinoParams(magnetometer=False)).replay(rows)["R_eb"]
+    clean = Starlino(StarlinoParams(use_magnetometer=False)).replay(rows)["R_eb"]
     rows["mag_b_ut"] = field
     estimator = Starlino()
     got = estimator.replay(rows)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-from scenarios.harness.logs import accounts, checks, column_map
+from scenarios.harness.logs import accounts, checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 
@@ -32,7 +32,7 @@ def read(
     reference : attitudes to score against, in a file of their own; for reference vectors one of the same set, for
                 others any log with an attitude, or a table of times on the same clock and attitudes
     columns : column map of a text or MATLAB file, see `column_map`
-    imu : which inertial unit of an autopilot's log, from 0; by default the first
+    imu : which inertial unit of an autopilot's log, from 0; by default the first one
 
     Raises
     ------
@@ -72,15 +72,18 @@ def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) ->
     by_map, autopilot = (_module(name, endings) for endings in (_BY_MAP, _OF_AUTOPILOTS))
     if meanings is not None and not by_map:
         raise LogError(f"{path}: a column map is for text and MATLAB files")
-    if imu is not None and not autopilot:
-        raise LogError(f"{path}: an inertial unit is chosen in logs of autopilots (.bin, .ulg)")
+    if imu is not None and not autopilot and by_map != "matlab":
+        raise LogError(f"{path}: an inertial unit is chosen in logs of autopilots (.bin, .ulg, their .mat)")
+    if by_map == "matlab":
+        return import_module(f"{__name__}.{by_map}").read(path, meanings, imu)
     if by_map:
         return import_module(f"{__name__}.{by_map}").read(path, meanings)
     if autopilot:
         return import_module(f"{__name__}.{autopilot}").read(path, imu)
     if path.is_dir() or name.endswith(".parquet"):
         return checks.mended(import_module(f"{__name__}.ours").read(path), path)
-    raise LogError(f"{path}: unknown kind of log; {KINDS}")
+    found = foreign.hint(path.read_bytes()[: foreign.ENOUGH])
+    raise LogError(f"{path}: this is {found}" if found else f"{path}: unknown kind of log; {KINDS}")
 
 
 def _module(name: str, endings: dict[str, str]) -> str:

@@ -1,199 +1,101 @@
-"""ArduPilot's logs as MATLAB files: IMU, GPS, MAG, ARSP, BARO and the attitude.
+"""ArduPilot's logs as MATLAB files: their messages as records, which `dataflash` reads like those of a .bin.
 
 A message is a matrix ``IMU`` with its ``IMU_label``, as Mission Planner writes it, or a structure ``IMU`` of vectors,
-as pymavlink's mavlogdump does.
-
-Each message has its own times; see `streams` for how they become rows.  Units are those that ArduPilot's messages have
-of old: degrees, milligauss, rad/s.
+as pymavlink's mavlogdump does.  Numbers are scaled already; ``LineNo`` is where a message stood in the log.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import accounts, properties, streams, tabular
-from scenarios.harness.logs.ledger import Ledger
-from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import Kind, Stream
-from scenarios.harness.logs.validity import usable
+from scenarios.harness.logs import dataflash
+from scenarios.harness.logs.dataflash_records import FIELDS, DataFlash, Records, own_time_s
+from scenarios.harness.logs.recorded import RecordedLog
 
-GYRO, FORCE, FIELD = (tuple(f"{name}{axis}" for axis in "XYZ") for name in ("Gyr", "Acc", "Mag"))
-FIX_3D = 3.0  # GPS.Status
-FIELD_UT = 0.1  # a milligauss
-_CLOCKS = (("SampleUS", 1e-6), ("TimeUS", 1e-6), ("T", 1e-3), ("TimeMS", 1e-3))
-_ATTITUDES: tuple[tuple[str, Kind], ...] = (("SIM", "truth"), ("ATT", "filter"), ("AHR2", "filter"))
+LINE = "LineNo"
 Table = dict[str, Array]
 
 
-def messages(tables: Mapping[str, Table]) -> dict[str, Table]:
-    """`tables` where they are the messages of an ArduPilot log; empty where they are not."""
-    imu = _chosen(tables, "IMU") or _chosen(tables, "GYR")
-    return dict(tables) if imu is not None and set(GYRO) <= set(imu[1]) and _clock(imu[1]) else {}
+class MatlabRecords(DataFlash):
+    """The messages of a log in `tables`, name -> column -> values, with the interface of `DataFlash`.
 
-
-def read(path: Path, tables: Mapping[str, Table], content: Mapping[str, Any]) -> RecordedLog:
-    """The log that the messages make; `content` holds all variables of the file, the parameters among them.
-
-    Raises
-    ------
-    LogError      one line: no inertial unit in it, or one that cannot be believed
+    content : all variables of the file, the parameters of the autopilot among them
     """
-    repairs: list[str] = []
-    inertial = _inertial(path, tables)
-    fixes, n_fixes, lost_s = _fixes(tables)
-    field = _stream(tables, "MAG", FIELD, healthy="Health")
-    attitude, kind = _attitude(tables)
-    found = streams.Messages(
-        inertial,
-        np.full(len(inertial.t_s), np.nan),
-        {"time": f"{inertial.name} time", "gyro": "GyrX GyrY GyrZ", "force": "AccX AccY AccZ"}
-        | {f"{ours}.{a.lower()}": f"{own}{a}" for ours, own in (("gyro", "Gyr"), ("force", "Acc")) for a in "XYZ"},
-        fixes=fixes,
-        field=replace(field, values=FIELD_UT * field.values) if field else None,
-        airspeed=_stream(tables, "ARSP", ("Airspeed",), healthy="H"),
-        height=_stream(tables, "BARO", ("Alt",), healthy="H"),
-        attitude=attitude,
-        kind=kind,
-    )
-    log = streams.recorded(path, found, repairs)
-    rows = log.rows.copy()
-    rows["gps_t_s"] = np.nan  # when a fix was true is not in these messages
-    rows["gps_valid"] = usable(rows["gps_new"] > 0, rows["t_s"], _rows_at(lost_s, rows["t_s"]))
-    rows.flags.writeable = False
-    known = {**properties.measured(rows), **log.known, **_parameters(content)}
-    if rows["gps_new"].any():
-        known.setdefault("gps_stamped", Known(False, "log", "no stamps of fixes"))
-    log = replace(log, rows=rows, known=known)
-    _account(log.ledger, log, found, n_fixes)
-    return log
+
+    def __init__(self, path: Path, tables: Mapping[str, Table], content: Mapping[str, Any]) -> None:
+        self.path, self.repairs = path, list[str]()
+        self._records = {_plain(name): _records(_plain(name), table) for name, table in tables.items()}
+        self._records |= {"PARM": _parameters(content.get("PARM")), "MSG": _texts(content.get("MSG"))}
+        self._types = {name: i for i, (name, records) in enumerate(self._records.items()) if len(records.fields)}
+
+    def records(self, name: str) -> Records:
+        """All records of that name; none where there are none."""
+        return self._records[name] if name in self._types else _none(name)
+
+    def column(self, records: Records, column: str) -> Array:
+        """One column in our units (angles in degrees), shape (n,)."""
+        return np.asarray(records.fields[column] * FIELDS.get(column, 1.0), np.float64)
 
 
-def _chosen(tables: Mapping[str, Table], name: str) -> tuple[str, Table] | None:
-    """The first instance of a message: of a column I, else of a number behind the name."""
-    own = next((n for n in (name, f"{name}_0", f"{name}0", f"{name}1", f"{name}_1") if n in tables), None)
-    if own is None:
-        return None
-    table = tables[own]
-    if "I" in table and len(table["I"]):
-        first = table["I"] == table["I"].min()
-        table = {label: values[first] for label, values in table.items() if len(values) == len(first)}
-    return own, table
+def messages(path: Path, tables: Mapping[str, Table], content: Mapping[str, Any]) -> MatlabRecords | None:
+    """`tables` as records where they are the messages of an ArduPilot log; None where they are not."""
+    log = MatlabRecords(path, tables, content)
+    found = [r for name in ("IMU", "GYR") for r in log.instances(name) if set(dataflash.GYRO) <= set(r.columns)]
+    return log if any(own_time_s(records) is not None for records in found) else None
 
 
-def _clock(table: Table) -> tuple[str, float] | None:
-    """The column with the time, and its factor to seconds: ``T`` where the others are weeks and their milliseconds."""
-    for column, factor in _CLOCKS:
-        if column in table and np.any(table[column] != 0.0) and (column != "T" or "Week" in table):
-            return column, factor
-    return None
+def read(log: MatlabRecords, imu: int | None = None) -> RecordedLog:
+    """The log that the messages make; LogError as `dataflash.read`."""
+    return dataflash.made(log, imu)
 
 
-def _stream(tables: Mapping[str, Table], name: str, columns: tuple[str, ...], healthy: str = "") -> Stream | None:
-    """The messages of a name; None where there are none with these columns.
-
-    healthy : a column that is zero where the sensor says that the sample is not to be trusted
-    """
-    found = _chosen(tables, name)
-    if found is None or not set(columns) <= set(found[1]) or (clock := _clock(found[1])) is None:
-        return None
-    own, table = found
-    good = table[healthy] != 0.0 if healthy in table else np.ones(len(table[clock[0]]), np.bool_)
-    if not good.any():
-        return None
-    return Stream(own, clock[1] * table[clock[0]][good], np.column_stack([table[c][good] for c in columns]))
+def _plain(name: str) -> str:
+    """``IMU`` of ``IMU_0``, and ``IMU2`` of ``IMU_1``, as instances are named."""
+    of, _, number = name.rpartition("_")
+    if not of or not number.isdigit():
+        return name
+    return of if number == "0" else f"{of}{int(number) + 1}"
 
 
-def _inertial(path: Path, tables: Mapping[str, Table]) -> Stream:
-    """Gyro and accelerometer: of IMU, else of GYR with ACC at its times."""
-    both = _stream(tables, "IMU", GYRO + FORCE)
-    if both is not None:
-        return both
-    gyro, force = _stream(tables, "GYR", GYRO), _stream(tables, "ACC", FORCE)
-    if gyro is None or force is None:
-        raise LogError(f"{path}: no inertial unit (IMU, or GYR and ACC); it has {', '.join(tables)}")
-    there = [tabular.interpolated(gyro.t_s, force.t_s, column) for column in force.values.T]
-    return Stream(gyro.name, gyro.t_s, np.column_stack((gyro.values, *there)))
+def _records(name: str, table: Table) -> Records:
+    """A table as records; columns of another length than the most are none of it."""
+    lengths = [len(values) for values in table.values()]
+    n = max(set(lengths), key=lengths.count)
+    columns = {label: values for label, values in table.items() if len(values) == n}
+    fields = np.zeros(n, np.dtype([(label, "f8") for label in columns]))
+    for label, values in columns.items():
+        fields[label] = values
+    lines = columns.get(LINE, np.zeros(n))
+    return Records(name, 0, fields, np.nan_to_num(lines).astype(np.intp))
 
 
-def _rows_at(times_s: Array, rows_s: Array) -> NDArray[np.bool_]:
-    """The rows into which messages of these times fall."""
-    at = np.searchsorted(rows_s, times_s)
-    there = np.zeros(len(rows_s), np.bool_)
-    there[at[at < len(rows_s)]] = True
-    return there
+def _none(name: str) -> Records:
+    return Records(name, 0, np.zeros(0, np.dtype([])), np.zeros(0, np.intp))
 
 
-def _fixes(tables: Mapping[str, Table]) -> tuple[Stream | None, int, Array]:
-    """Fixes of three dimensions, with speed, course over ground and the vertical speed, which counts down; how many
-    reports there were; and the times of those without a fix."""
-    columns = ("Status", "Lat", "Lng", "Alt", "Spd", "GCrs")
-    found = _chosen(tables, "GPS")
-    vertical = ("VZ",) if found is not None and "VZ" in found[1] else ()
-    gps = _stream(tables, "GPS", columns + vertical)
-    if gps is None:
-        return None, 0, np.zeros(0)
-    fixed = gps.values[:, 0] >= FIX_3D
-    t_s, values = gps.t_s[fixed], gps.values[fixed]
-    speed, course = values[:, 4], np.radians(values[:, 5])
-    down = values[:, 6] if vertical else np.zeros(len(t_s))
-    velocity = (speed * np.cos(course), speed * np.sin(course), down)
-    stream = Stream(gps.name, t_s, np.column_stack((values[:, 1:4], *velocity, t_s)))
-    return stream, len(fixed), gps.t_s[~fixed]
-
-
-def _attitude(tables: Mapping[str, Table]) -> tuple[Stream | None, Kind]:
-    """The attitude: the simulator's where there is one, else what was flown on, else that of the other estimator."""
-    for name, kind in _ATTITUDES:
-        quaternion = _stream(tables, name, ("Q1", "Q2", "Q3", "Q4"))
-        stream = quaternion or _stream(tables, name, ("Roll", "Pitch", "Yaw"))
-        if stream is None:
-            continue
-        names = ("qw", "qx", "qy", "qz") if quaternion else ("roll", "pitch", "yaw")
-        values = stream.values if quaternion else np.radians(stream.values)
-        R_eb = tabular.attitude(dict(zip(names, values.T, strict=True)))
-        if R_eb is not None and np.isfinite(R_eb).any():
-            return Stream(stream.name, stream.t_s, R_eb.reshape(-1, 9)), kind
-    return None, "filter"
-
-
-def _parameters(content: Mapping[str, Any]) -> dict[str, Known]:
-    """What the parameters of the autopilot say, of the cell array or structure ``PARM``."""
-    value = content.get("PARM")
-    found: dict[str, float] = {}
+def _parameters(value: Any) -> Records:
+    """The parameters, of a cell array of names and values or a structure of both."""
+    pairs: list[tuple[str, float]] = []
     if isinstance(value, np.ndarray) and value.dtype.names and {"Name", "Value"} <= set(value.dtype.names):
         names, numbers = np.atleast_1d(value["Name"].item()), np.atleast_1d(value["Value"].item())
-        found = {str(n).strip(): float(v) for n, v in zip(names, numbers, strict=False)}
+        pairs = list(zip(map(str, names), map(float, numbers), strict=False))
     elif isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 2 and value.shape[1] == 2:
-        found = {str(n).strip(): float(v) for n, v in value}
-    declination = found.get("COMPASS_DEC", 0.0)
-    return {"declination_rad": Known(declination, "log", "COMPASS_DEC")} if declination else {}
+        pairs = [(str(name), float(number)) for name, number in value]
+    fields = np.zeros(len(pairs), np.dtype([("Name", "S16"), ("Value", "f8")]))
+    fields["Name"] = [name.strip().encode("ascii", "replace") for name, _ in pairs]
+    fields["Value"] = [number for _, number in pairs]
+    return Records("PARM", 0, fields, np.zeros(len(pairs), np.intp))
 
 
-def _account(ledger: Ledger, log: RecordedLog, found: streams.Messages, n_fixes: int) -> None:
-    """Enter every stream of which the books do not know yet."""
-    rows = log.rows
-    reference = 0 if log.reference is None or found.attitude is None else len(found.attitude.t_s)
-    for stream, messages_, used in (
-        ("imu", len(found.inertial.t_s), len(rows)),
-        ("gps", n_fixes, int(np.sum(rows["gps_new"] > 0))),
-        ("magnetometer", len(found.field.t_s) if found.field else 0, int(np.sum(rows["mag_new"] > 0))),
-        ("airspeed", len(found.airspeed.t_s) if found.airspeed else 0, int(np.sum(rows["air_new"] > 0))),
-        ("barometer", len(found.height.t_s) if found.height else 0, len(found.height.t_s) if found.height else 0),
-        ("reference", reference, reference),
-    ):
-        if stream in ledger or not messages_:
-            continue
-        ledger.read(stream, messages_)
-        left = messages_ - used
-        if stream == "gps":
-            no_fix = n_fixes - (len(found.fixes.t_s) if found.fixes else 0)
-            ledger.leave_out(stream, no_fix, accounts.NO_FIX)
-            left -= no_fix
-        ledger.leave_out(stream, left, "no number, a time that does not fit, or another in the same row")
-        ledger.use(stream, used)
+def _texts(value: Any) -> Records:
+    """What the autopilot announced, of a structure; a matrix holds no words."""
+    if not (isinstance(value, np.ndarray) and value.dtype.names and "Message" in value.dtype.names):
+        return _none("MSG")
+    said: NDArray[Any] = np.atleast_1d(value["Message"].item())
+    fields = np.zeros(len(said), np.dtype([("Message", "S64")]))
+    fields["Message"] = [str(text).encode("ascii", "replace") for text in said]
+    return Records("MSG", 0, fields, np.zeros(len(said), np.intp))

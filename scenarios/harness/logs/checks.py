@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from estimator.interface import Array
 from estimator.screening import G_M_S2, GYRO_RANGE_RAD_S, LONGEST_GAP_S
-from scenarios.harness.logs import accounts
+from scenarios.harness.logs import accounts, gaps
+from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.witnesses import witnesses
 
@@ -30,10 +31,11 @@ FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in an
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
 _PERIODS = (2.0**16, 86400.0, 604800.0, 86400.0e3, 604800.0e3, 2.0**32)  # of counters, days and weeks in s and ms
 _DEGREES = 180.0 / np.pi
+NO_NUMBER, AGAIN, ZEROS = accounts.NO_NUMBER, accounts.REPEATED, accounts.ZEROS
 _ARRIVALS = (
-    ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s")),
-    ("mag_new", "magnetic samples", ("mag_b_ut",)),
-    ("air_new", "air-data samples", ("airspeed_m_s", "baro_height_m")),
+    ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s"), "gps"),
+    ("mag_new", "magnetic samples", ("mag_b_ut",), "magnetometer"),
+    ("air_new", "air-data samples", ("airspeed_m_s", "baro_height_m"), "airspeed"),
 )
 _EITHER = "air_new"  # arrives where one of its numbers is there: not every aeroplane has a pitot tube
 
@@ -92,19 +94,22 @@ def unwrapped(ticks: Array) -> Array:
     return ticks
 
 
-def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list[str]) -> NDArray[np.intp]:
+def kept(
+    t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list[str], ledger: Ledger | None = None
+) -> NDArray[np.intp]:
     """Rows to keep, in order of time.
 
     Parameters
     ----------
     t_s : shape (N,)          numbers : our name -> shape (N,), columns in which a row must have a number
     repairs : lines are added to it
+    ledger : rows that are left out are counted in it, in the stream ``imu``
 
     Raises
     ------
     LogError      a column without a number, more bad rows than good ones, or a clock that runs back
     """
-    n = len(t_s)
+    n, ledger = len(t_s), Ledger() if ledger is None else ledger
     good = np.ones(n, np.bool_)
     for name, values in {"time": t_s, **numbers}.items():
         bad = ~np.isfinite(values)
@@ -114,9 +119,11 @@ def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list
             first = int(np.flatnonzero(bad)[0])
             repairs.append(f"{source.column(name)}: {bad.sum()} without a number left out, first {source.row(first)}")
             good &= ~bad
+    ledger.leave_out("imu", int((~good).sum()), NO_NUMBER)
     empty = np.logical_and.accumulate(np.all([values == 0.0 for values in numbers.values()], axis=0))
     if empty.any():
         repairs.append(f"{empty.sum()} rows of zeros before the first reading left out, first {source.row(0)}")
+        ledger.leave_out("imu", int((empty & good).sum()), ZEROS)
         good &= ~empty
     if 2 * good.sum() < n:
         first = int(np.flatnonzero(~good)[0])
@@ -138,6 +145,7 @@ def kept(t_s: Array, numbers: Mapping[str, Array], source: Source, repairs: list
     if len(again):
         first_row = source.row(int(keep[again[0]]))
         repairs.append(f"{source.column('time')}: {len(again)} repeated, left out; first {first_row}")
+        ledger.leave_out("imu", len(again), AGAIN)
         keep = np.delete(keep, again)
     return keep
 
@@ -159,14 +167,15 @@ def mended(log: RecordedLog, path: Path) -> RecordedLog:
     accounts.inertial(log.ledger, rows["t_s"], np.column_stack(list(numbers.values())), keep)
     if len(keep) < len(rows) or np.any(np.diff(keep) != 1):
         moved = rows[keep]
-        for name, _, _ in _ARRIVALS:  # what arrived with a row left out arrives with the next
+        for name, *_ in _ARRIVALS:  # what arrived with a row left out arrives with the next
             at = np.searchsorted(moved["t_s"], rows["t_s"][rows[name] > 0])
             moved[name] = 0
             moved[name][at[at < len(moved)]] = 1
         rows = moved
         if reference is not None:
             reference = replace(reference, R_eb=reference.R_eb[keep])
-    found = judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
+    found = judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs), ledger=Ledger()), source)
+    found = replace(found, ledger=log.ledger)
     accounts.arrivals(log.ledger, log.rows, found.rows)
     if log.reference is not None and reference is not None:
         accounts.reference(log.ledger, log.reference.known, int(reference.known.sum()))
@@ -182,7 +191,7 @@ def judged(log: RecordedLog, source: Source) -> RecordedLog:
     """
     rows, repairs = log.rows.copy(), list(log.repairs)
     _fill_intervals(rows, source, repairs)
-    _check_arrivals(rows, repairs)
+    _check_arrivals(rows, repairs, log.ledger)
     _check_force(rows, source, repairs)
     factor = rate_factor(rows, log.reference)
     if factor != 1.0:
@@ -195,7 +204,7 @@ def judged(log: RecordedLog, source: Source) -> RecordedLog:
 
 
 def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:
-    """Set ``dt_s`` where there is none; tell of gaps."""
+    """Set ``dt_s`` where there is none; report gaps."""
     if len(rows) < 2:
         raise source.refusal(None, "time", "a log of one row")
     steps = np.diff(rows["t_s"])
@@ -206,11 +215,11 @@ def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> N
     steps = np.concatenate(([usual], steps))
     unknown = ~(rows["dt_s"] > 0.0)
     rows["dt_s"][unknown] = np.where(steps > LONGEST_GAP_S, usual, steps)[unknown]
-    said = np.where(unknown, usual, rows["dt_s"])
-    lost = np.round(steps / said) - 1.0
-    short = (steps > 1.5 * said) & (steps <= LONGEST_GAP_S)
+    expected = np.where(unknown, usual, rows["dt_s"])
+    short = gaps.missing(rows["t_s"], expected) & (steps <= LONGEST_GAP_S)
     if short.any():
-        repairs.append(f"{lost[short].sum():.0f} samples lost, the next stands for them; first {_at(rows, short)}")
+        lost = np.maximum(np.round(steps / expected) - 1.0, 1.0)[short].sum()
+        repairs.append(f"{lost:.0f} samples lost, the next stands for them; first {_at(rows, short)}")
     long = np.flatnonzero(steps > LONGEST_GAP_S)
     if len(long):
         k = int(long[np.argmax(steps[long])])
@@ -218,14 +227,16 @@ def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> N
                        f"until {rows['t_s'][k]:.2f} s")  # fmt: skip
 
 
-def _check_arrivals(rows: NDArray[Any], repairs: list[str]) -> None:
+def _check_arrivals(rows: NDArray[Any], repairs: list[str], ledger: Ledger) -> None:
     """What arrived without a number in it did not arrive."""
-    for new, what, columns in _ARRIVALS:
+    for new, what, columns, stream in _ARRIVALS:
         broken = rows[new] > 0
         there = [np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns]
         broken &= ~(np.any if new == _EITHER else np.all)(there, axis=0)
         if broken.any():
             repairs.append(f"{broken.sum()} {what} without a number left out, first {_at(rows, broken)}")
+            if stream in ledger:
+                ledger.leave_out(stream, int(broken.sum()), NO_NUMBER)
             rows[new][broken] = 0
 
 

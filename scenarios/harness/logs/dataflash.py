@@ -1,37 +1,26 @@
 """ArduPilot's DataFlash logs (.bin): IMU, GPS, MAG, ARSP, BARO, and the attitude in SIM, ATT or AHR2.
 
-A log is a row of packed records: two bytes of header, a type, and the fields as the FMT record of that type says;
-UNIT, MULT and FMTU tell units, else they are those of `FIELDS`.  Records are found here, since pymavlink's reader
-gives up the rest of a log where damaged bytes look like a type that it does not know; a record counts where the next
-header follows it.  What the characters of a format mean comes from pymavlink.
-
-Rates logged in RATE are those of the controller, filtered and corrected, and not what the gyro measured: not used.
+A fix has no time at which it was true: GPS has the time at which it was logged, and ``SMS`` in GPA that of its arrival.
+MAG holds the field after the firmware's corrections, with the offsets that it applied beside it.  Rates logged in
+RATE are those of the controller, filtered and corrected, and not what the gyro measured: not used.
 """
 
-import struct
-from collections import defaultdict
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.instruments import Known
 from estimator.interface import Array
 from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import streams, tabular
+from scenarios.harness.logs.ardupilot import FIX_3D, Parameters, year_of
+from scenarios.harness.logs.dataflash_records import Clock, DataFlash, Records, own_time_s
 from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import Kind, Stream
+from scenarios.harness.logs.streams import IN_GAP, NO_FIX, UNHEALTHY, Kind, Stream
 
-HEADER, FMT, FMT_LENGTH = b"\xa3\x95", 128, 89
-FIX_3D = 3.0  # GPS.Status
-_DEG = np.pi / 180.0
-LABELS = {  # of UNIT -> factor to ours: angles stay in degrees, rates are in radians
-    "rad/s": 1.0, "deg/s": _DEG, "m/s/s": 1.0, "m/s": 1.0, "m": 1.0, "Gauss": 100.0,
-    "deg": 1.0, "degheading": 1.0, "deglatitude": 1.0, "deglongitude": 1.0, "rad": 1.0 / _DEG,
-}  # fmt: skip
 GYRO, FORCE, FIELD = (tuple(f"{name}{axis}" for axis in "XYZ") for name in ("Gyr", "Acc", "Mag"))
-FIELDS = dict.fromkeys(FIELD, 0.1)  # factor to ours where the log tells no unit: milligauss; the others are in ours
+FIX = ("Lat", "Lng", "Alt", "Spd", "GCrs")
+HEALTHY = ("GH", "AH", "GyHlt", "AcHlt"), ("Health",), ("H", "Health")  # of IMU, of MAG, and of ARSP and BARO
 ATTITUDES: tuple[tuple[str, Kind], ...] = (
     ("SIM", "truth"),
     ("ATT", "filter"),
@@ -42,190 +31,228 @@ ATTITUDES: tuple[tuple[str, Kind], ...] = (
 def read(path: Path, imu: int | None = None) -> RecordedLog:
     """The log at `path`.
 
-    imu : which inertial unit, from 0; the first one unless told
+    imu : which inertial unit, from 0; by default the first one
 
     Raises
     ------
     LogError      one line: no such log, no inertial unit in it, or one that cannot be believed
     """
-    log = _Log(path)
-    inertial = _inertial(log, imu)
+    return made(DataFlash(path), imu)
+
+
+def made(records: DataFlash, imu: int | None = None) -> RecordedLog:
+    """The log that the records make, whatever file they are from; `imu` and LogError as for `read`."""
+    log = _Log(records)
+    inertial = log.inertial(imu)
+    fixes, receiver = log.fixes()
+    field, compass = log.field()
+    airspeed, pitot = log.airspeed()
+    height = log.stream("BARO", ("Alt",), HEALTHY[2])
+    attitude = log.attitude()
+    if log.others:
+        log.repairs.append(f"of several instances one is read: {'; '.join(log.others)}")
     messages = streams.Messages(
         inertial,
         np.full(len(inertial.t_s), np.nan),
         {"time": f"{inertial.name} time", "gyro": "GyrX GyrY GyrZ", "force": "AccX AccY AccZ"}
         | {f"{ours}.{a.lower()}": f"{own}{a}" for ours, own in (("gyro", "Gyr"), ("force", "Acc")) for a in "XYZ"},
-        _fixes(log),
-        log.stream("MAG", FIELD, healthy="Health"),
-        log.stream("ARSP", ("Airspeed",), healthy="H"),
-        log.stream("BARO", ("Alt",), healthy="H"),
-        *_attitude(log),
+        fixes,
+        field,
+        airspeed,
+        height,
+        *attitude,
+        {**receiver, **compass, **pitot},
+        log.parameters.log_imu(),
     )
-    return streams.recorded(path, messages, log.repairs)
-
-
-@dataclass(frozen=True, slots=True)
-class _Format:
-    """What an FMT record says of a type of message."""
-
-    name: str
-    length: int
-    codes: str
-    columns: tuple[str, ...]
-    dtype: np.dtype[Any]
+    return streams.recorded(records.path, messages, log.repairs)
 
 
 class _Log:
-    """The messages of a log by name.  Attribute `repairs` tells of bytes that were left out."""
+    """The streams of a log.  `others` lists what was read of several instances."""
 
-    def __init__(self, path: Path) -> None:
-        try:
-            from pymavlink.DFReader import FORMAT_TO_STRUCT  # type: ignore[import-untyped]
-        except ImportError as error:
-            raise LogError(f'{path}: logs of ArduPilot need pymavlink: pip install "wingslevel[logs]"') from error
-        self.path, self.repairs = path, list[str]()
-        self._codes: dict[str, tuple[str, float | None, Any]] = FORMAT_TO_STRUCT
-        try:
-            self._raw = path.read_bytes()
-        except OSError as error:
-            raise LogError(f"{path}: cannot be read: {error.strerror}") from error
-        self._formats: dict[int, _Format] = {}
-        self._offsets = self._walk()
-        if not self._formats:
-            raise LogError(f"{path}: no DataFlash log: no message is defined in its {len(self._raw)} bytes")
-        self._types = {f.name: kind for kind, f in self._formats.items() if self._offsets[kind]}
-        self._units = self._told_units()
+    def __init__(self, records: DataFlash) -> None:
+        self.of, self.path, self.repairs = records, records.path, records.repairs
+        self.parameters = Parameters.of(records)
+        self.others = list[str]()
+        self.clock = Clock(np.zeros(0), np.zeros(0, np.intp))
 
-    def _walk(self) -> dict[int, list[int]]:
-        """Offsets of the records of each type; formats are learnt on the way, what is no record is counted."""
-        raw, end = self._raw, len(self._raw)
-        lengths, found = {FMT: FMT_LENGTH}, defaultdict[int, list[int]](list)
-        at, bad, first = 0, 0, -1
-        while at < end:
-            length = lengths.get(raw[at + 2], 0) if raw.startswith(HEADER, at) and at + 2 < end else 0
-            after = at + length
-            kind, body = raw[at + 2] if length else 0, raw[at + 3 : after]
-            follows = length and after <= end and HEADER.startswith(raw[after : after + 2])
-            if follows or (kind == FMT and after <= end and HEADER not in body):  # without it a type would be lost
-                if kind == FMT:
-                    self._define(body, lengths)
-                found[kind].append(at)
-                at = after
-                continue
-            next_at = raw.find(HEADER, at + 1)
-            if next_at < 0:
-                self.repairs.append(f"{end - at} bytes at the end are no whole record: left out")
-                break
-            bad, first = bad + next_at - at, at if first < 0 else first
-            at = next_at
-        if bad:
-            self.repairs.insert(0, f"{bad} bytes that are no whole record left out, first at byte {first}")
+    def readable(self, name: str, *wanted: str) -> list[Records]:
+        """The instances of a message that have the columns `wanted`."""
+        there = self.of.instances(name)
+        found = [r for r in there if set(wanted) <= set(r.columns)]
+        if there and not found:
+            lacking = ", ".join(c for c in wanted if c not in there[0].columns)
+            self.repairs.append(f"{name} has no {lacking}: {sum(len(r.fields) for r in there)} messages not read")
         return found
 
-    def _define(self, body: bytes, lengths: dict[int, int]) -> None:
-        kind, length, *words = struct.unpack("<BB4s16s64s", body)
-        name, codes, columns = (word.partition(b"\0")[0].decode("ascii", "replace") for word in words)
-        if length <= 3:
-            return
-        lengths.setdefault(kind, length)
-        names = tuple(columns.split(","))
-        if len(names) != len(codes) or len(set(names)) < len(names) or not all(c in self._codes for c in codes):
-            return
-        types = (self._codes[c][0] for c in codes)
-        dtype = np.dtype([(n, f"S{t[:-1]}" if t.endswith("s") else f"<{t}") for n, t in zip(names, types, strict=True)])
-        if dtype.itemsize == length - 3:
-            self._formats.setdefault(kind, _Format(name, length, codes, names, dtype))
+    def _one(self, instances: list[Records], chosen: Records) -> Records:
+        """Note that the others are not read."""
+        if len(instances) > 1:
+            listed = ", ".join(str(r.instance) for r in instances)
+            self.others.append(f"{instances[0].name} {chosen.instance} of {listed}")
+        return chosen
 
-    def records(self, name: str) -> NDArray[Any]:
-        """All records of that name, with the fields as they were packed."""
-        kind = self._types[name]
-        size, offsets = self._formats[kind].length - 3, np.array(self._offsets[kind])
-        block = np.frombuffer(self._raw, np.uint8)[offsets[:, None] + np.arange(3, 3 + size)]
-        return np.ascontiguousarray(block).view(self._formats[kind].dtype)[:, 0]
+    def made(self, records: Records, columns: tuple[str, ...]) -> Stream:
+        """A stream of those columns, on the clock of the log."""
+        stream = Stream.of(records.name, np.zeros(len(records.fields)), self.of.table(records, columns))
+        t_s = own_time_s(records)
+        if t_s is not None and self.clock.agrees(records, t_s):
+            return _at_times(stream, t_s)
+        t_s, in_gap = self.clock.by_order(records)
+        self.repairs.append(f"{records.name}: no time by the clock of the log; placed by the order of the records")
+        return _at_times(stream, t_s).without(np.isnan(t_s), streams.OUTSIDE).without(in_gap, IN_GAP)
 
-    def _told_units(self) -> dict[tuple[str, str], float]:
-        """Factor to ours of each (message, column) of which the log tells a unit that we know."""
-        if not {"UNIT", "MULT", "FMTU"} <= self._types.keys():
-            return {}
-        unit, mult, told = self.records("UNIT"), self.records("MULT"), self.records("FMTU")
-        labels = {chr(i): label.decode("ascii", "replace") for i, label in zip(unit["Id"], unit["Label"], strict=True)}
-        multipliers = {chr(i): float(m) for i, m in zip(mult["Id"], mult["Mult"], strict=True)}
-        factors = {}
-        for kind, units, by in zip(told["FmtType"], told["UnitIds"], told["MultIds"], strict=True):
-            if int(kind) not in self._formats:
-                continue
-            of = self._formats[int(kind)]
-            for name, code, u, m in zip(
-                of.columns, of.codes, units.decode("latin1"), by.decode("latin1"), strict=False
-            ):
-                if (factor := LABELS.get(labels.get(u, ""))) is not None:
-                    scaled = self._codes[code][1] is not None  # by the character of the format already
-                    factors[of.name, name] = factor * (1.0 if scaled else multipliers.get(m, 1.0) or 1.0)
-        return factors
-
-    def column(self, name: str, records: NDArray[Any], column: str) -> Array:
-        """One column in our units (angles in degrees), shape (n,)."""
-        of = self._formats[self._types[name]]
-        own = self._codes[of.codes[of.columns.index(column)]][1] or 1.0
-        # Divided, as the writer multiplied: 1/0.01 is a whole number, 0.01 is not.
-        with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
-            values = records[column].astype(np.float64) / round(1.0 / own)
-        return np.asarray(values * self._units.get((name, column), FIELDS.get(column, 1.0)))
-
-    def time_s(self, name: str, records: NDArray[Any]) -> Array:
-        """When the messages were logged, or the sample was taken where they tell."""
-        columns = self._formats[self._types[name]].columns
-        clocks = (("SampleUS", 1e6), ("TimeUS", 1e6), *((("T", 1e3),) if "Week" in columns else ()), ("TimeMS", 1e3))
-        for column, per_s in clocks:
-            if column in columns and records[column].any():  # some drivers leave SampleUS empty
-                return np.asarray(records[column].astype(np.float64) / per_s)
-        raise LogError(f"{self.path}: {name} has no time; it has {', '.join(columns)}")
-
-    def chosen(self, name: str, instance: int | None = None) -> tuple[str, NDArray[Any]] | None:
-        """Records of an instance of a message, the first unless told: of a column I, or a number behind the name."""
-        if name in self._types and "I" in self._formats[self._types[name]].columns:
-            records = self.records(name)
-            which = records["I"].min() if instance is None else instance
-            return (name, records[records["I"] == which]) if np.any(records["I"] == which) else None
-        number = (instance or 0) + 1
-        for own in (name, f"{name}1") if number == 1 else (f"{name}{number}",):
-            if own in self._types:
-                return own, self.records(own)
-        return None
-
-    def stream(
-        self, name: str, columns: tuple[str, ...], instance: int | None = None, healthy: str = ""
-    ) -> Stream | None:
+    def stream(self, name: str, columns: tuple[str, ...], healthy: tuple[str, ...] = ()) -> Stream | None:
         """The messages in our units; None where there are none with these columns.
 
-        healthy : a column that is zero where the sensor says that the sample is not to be trusted
+        healthy : columns that are zero where the sensor says that the sample is not to be trusted
         """
-        found = self.chosen(name, instance)
-        if found is None or not set(columns) <= set(found[1].dtype.names or ()):
+        found = self.readable(name, *columns)
+        if not found:
             return None
-        own, records = found
-        if healthy in (records.dtype.names or ()):
-            records = records[records[healthy] != 0]
-        if not len(records):
-            return None
-        return Stream(own, self.time_s(own, records), np.column_stack([self.column(own, records, c) for c in columns]))
+        records = self._one(found, found[0])
+        return _trusted(self.made(records, columns), records, healthy)
 
-    @property
-    def names(self) -> list[str]:
-        """Of the messages that are there."""
-        return sorted(self._types)
+    def inertial(self, imu: int | None) -> Stream:
+        """Gyro and accelerometer: of IMU, else of GYR with ACC at its times."""
+        whole = [r for r in self.of.instances("IMU") if set(GYRO + FORCE) <= set(r.columns)]
+        forces = {r.instance: r for r in self.of.instances("ACC") if set(FORCE) <= set(r.columns)}
+        halves = [r for r in self.of.instances("GYR") if set(GYRO) <= set(r.columns) and r.instance in forces]
+        found = halves if not whole or (halves and _too_slow(whole[0])) else whole
+        if not found:
+            has = f"it has {', '.join(self.of.names)}"
+            why = f"no inertial unit (IMU, or GYR and ACC): {self.parameters.log_imu()}"
+            raise LogError(f"{self.path}: {why}; {has}")
+        chosen = next((r for r in found if imu is None or r.instance == imu), None)
+        if chosen is None:
+            there = " and ".join(str(r.instance) for r in found)
+            raise LogError(f"{self.path}: no inertial unit {imu}; {found[0].name} has {there}")
+        self._one(found, chosen)
+        t_s = own_time_s(chosen)
+        if t_s is None:
+            raise LogError(f"{self.path}: {chosen.name} has no time; it has {', '.join(chosen.columns)}")
+        self.clock = Clock(t_s, chosen.offsets)
+        if found is whole:
+            stream = _at_times(Stream.of(chosen.name, t_s, self.of.table(chosen, GYRO + FORCE)), t_s)
+            stream = _trusted(stream, chosen, HEALTHY[0])
+        else:
+            force = self.made(forces[chosen.instance], FORCE)
+            values = np.column_stack((self.of.table(chosen, GYRO), _at(t_s, force)))
+            stream = Stream.of(chosen.name, t_s, values)
+        if 2 * np.sum(stream.why != "") > len(t_s):
+            n, flags = np.sum(stream.why != ""), " ".join(c for c in HEALTHY[0] if c in chosen.columns)
+            why = f"{n} of {len(t_s)} samples of {chosen.name} {chosen.instance} are unhealthy by its own {flags}"
+            raise LogError(f"{self.path}: {why}: choose another unit with --imu")
+        return stream
+
+    def fixes(self) -> tuple[Stream | None, dict[str, Known]]:
+        """Speed and course over ground, and the vertical speed, which counts down; what is known of the receiver.
+
+        Of several receivers the one that the firmware used most.
+        """
+        found = self.readable("GPS", "Status", *FIX)
+        if not found:
+            set_before = self.parameters.declination(None, np.nan)
+            return None, {"declination_rad": set_before} if set_before else {}
+        records = self._one(found, max(found, key=lambda r: (_in_use(r), -r.instance)))
+        reports = self._reports_vertical(records)
+        vertical = reports is None or reports.value
+        stream = self.made(records, (*FIX, "VZ") if vertical else FIX)
+        speed, course = stream.values[:, 3], np.radians(stream.values[:, 4])
+        down = stream.values[:, 5] if vertical else np.zeros(len(speed))
+        unknown = np.full(len(speed), np.nan)  # when it was true
+        table = (*stream.values[:, :3].T, speed * np.cos(course), speed * np.sin(course), down, unknown)
+        no_fix = records.fields["Status"] < FIX_3D
+        stream = Stream(stream.name, stream.t_s, np.column_stack(table), stream.why, 1, no_fix).without(no_fix, NO_FIX)
+        known = {"gps_latency_s": self.parameters.latency(records.instance), "gps_vertical_velocity": reports}
+        usable = np.flatnonzero((stream.why == "") & np.isfinite(stream.values[:, :3]).all(axis=1))
+        place = _place(stream.values[usable[0]]) if len(usable) else None
+        known["declination_rad"] = self.parameters.declination(place, year_of(records.where(~no_fix)))
+        return stream, {name: value for name, value in known.items() if value is not None}
+
+    def _reports_vertical(self, fixes: Records) -> Known | None:
+        """Whether the receiver reports a vertical velocity, as far as the log says so: by VZ, or by GPA.VV."""
+        if "VZ" not in fixes.columns:
+            return Known(False, "log", f"{fixes.name} has no VZ")
+        if np.isnan(self.of.column(fixes, "VZ")).all():
+            return Known(False, "log", f"{fixes.name}.VZ")
+        found = [r for r in self.of.instances("GPA") if r.instance == fixes.instance and "VV" in r.columns]
+        return Known(bool(np.mean(found[0].fields["VV"] != 0) > 0.5), "log", f"{found[0].name}.VV") if found else None
+
+    def field(self) -> tuple[Stream | None, dict[str, Known]]:
+        """The magnetic field of the first compass that is used, left out where none is."""
+        found = self.readable("MAG", *FIELD)
+        if not found:
+            return None, {}
+        records = self._one(found, next((r for r in found if not self.parameters.compass_off(r.instance)), found[0]))
+        off = self.parameters.compass_off(records.instance)
+        stream = self.made(records, FIELD)
+        if off:
+            return stream.without(np.ones(len(stream.t_s), np.bool_), off), {
+                "use_magnetometer": Known(False, "log", off.partition(" ")[0])
+            }
+        return _trusted(stream, records, HEALTHY[1]), {}
+
+    def airspeed(self) -> tuple[Stream | None, dict[str, Known]]:
+        """The airspeed of the sensor that is used, left out where or while none is."""
+        found = self.readable("ARSP", "Airspeed")
+        if not found:
+            return None, {}
+        on = [r for r in found if not self.parameters.airspeed_off(r.instance)] or found
+        records = self._one(found, max(on, key=lambda r: (_in_use(r), -r.instance)))
+        off = self.parameters.airspeed_off(records.instance)
+        stream = self.made(records, ("Airspeed",))
+        used = records.fields["U"] != 0 if "U" in records.columns else np.full(len(stream.t_s), not off)
+        if off.endswith("is 0"):
+            return stream.without(np.ones(len(stream.t_s), np.bool_), off), {
+                "use_airspeed": Known(False, "log", off.partition(" ")[0])
+            }
+        return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"not in use by {records.name}.U"), {}
+
+    def attitude(self) -> tuple[Stream | None, Kind]:
+        """The attitude: the simulator's where there is one, else what was flown on, else that of the other filter."""
+        for name, kind in ATTITUDES:
+            for columns, ours in ((("Q1", "Q2", "Q3", "Q4"), ("qw", "qx", "qy", "qz")),
+                                  (("Roll", "Pitch", "Yaw"), ("roll", "pitch", "yaw"))):  # fmt: skip
+                found = [r for r in self.of.instances(name) if set(columns) <= set(r.columns)]
+                if not found:
+                    continue
+                records = self._one(found, found[0])
+                stream = self.made(records, columns)
+                values = stream.values if ours[0] == "qw" else np.radians(stream.values)
+                R_eb = tabular.attitude(dict(zip(ours, values.T, strict=True)))
+                if R_eb is not None and np.isfinite(R_eb).any():
+                    return Stream(stream.name, stream.t_s, R_eb.reshape(-1, 9), stream.why), kind
+                break
+        return None, "filter"
 
 
-def _inertial(log: _Log, imu: int | None) -> Stream:
-    """Gyro and accelerometer: of IMU, else of GYR with ACC at its times."""
-    both = log.stream("IMU", GYRO + FORCE, imu)
-    if both is not None:
-        return both
-    gyro, force = log.stream("GYR", GYRO, imu), log.stream("ACC", FORCE, imu)
-    if gyro is None or force is None:
-        which = "" if imu is None else f" {imu}"
-        raise LogError(f"{log.path}: no inertial unit{which} (IMU, or GYR and ACC); it has {', '.join(log.names)}")
-    return Stream(gyro.name, gyro.t_s, np.column_stack((gyro.values, _at(gyro.t_s, force))))
+def _at_times(stream: Stream, t_s: Array) -> Stream:
+    return Stream(stream.name, t_s, stream.values, stream.why)
+
+
+def _trusted(stream: Stream, records: Records, healthy: tuple[str, ...]) -> Stream:
+    """Without samples of which one of the columns `healthy` is zero."""
+    for column in healthy:
+        if column in records.columns:
+            stream = stream.without(records.fields[column] == 0, UNHEALTHY)
+    return stream
+
+
+def _in_use(records: Records) -> int:
+    """How many of the messages say that the firmware used this instance."""
+    return int(np.sum(records.fields["U"] != 0)) if "U" in records.columns else 0
+
+
+def _too_slow(records: Records) -> bool:
+    t_s = own_time_s(records)
+    return t_s is not None and len(t_s) > 2 and float(np.median(np.diff(t_s))) > 1.05 * streams.SLOWEST_S
+
+
+def _place(fix: Array) -> tuple[float, float, float]:
+    """Latitude, longitude and altitude of a fix; of one that is nowhere on earth those of the nearest place."""
+    latitude, longitude, altitude = (float(x) for x in fix[:3])
+    return min(max(latitude, -90.0), 90.0), min(max(longitude, -180.0), 180.0), altitude
 
 
 def _at(t_s: Array, stream: Stream) -> Array:
@@ -238,37 +265,3 @@ def _at(t_s: Array, stream: Stream) -> Array:
     inside &= (times[after] == t_s) | (times[after] - times[before] <= LONGEST_GAP_S)
     there = np.column_stack([np.interp(t_s, times, column) for column in values.T])
     return np.where(inside[:, None], there, np.nan)
-
-
-def _fixes(log: _Log) -> Stream | None:
-    """Fixes of three dimensions: speed and course over ground, and the vertical speed, which counts down."""
-    columns = ("Status", "Lat", "Lng", "Alt", "Spd", "GCrs")
-    found = log.chosen("GPS")
-    vertical = ("VZ",) if found is not None and "VZ" in (found[1].dtype.names or ()) else ()
-    gps = log.stream("GPS", columns + vertical)
-    if gps is None:
-        return None
-    fixed = gps.values[:, 0] >= FIX_3D
-    t_s, values = gps.t_s[fixed], gps.values[fixed]
-    speed, course = values[:, 4], np.radians(values[:, 5])
-    down = values[:, 6] if vertical else np.zeros(len(t_s))
-    velocity = (speed * np.cos(course), speed * np.sin(course), down)
-    return Stream(gps.name, t_s, np.column_stack((values[:, 1:4], *velocity, t_s)))
-
-
-def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
-    """The attitude: the simulator's where there is one, else what was flown on, else that of the other estimator."""
-    for name, kind in ATTITUDES:
-        quaternion = log.stream(name, ("Q1", "Q2", "Q3", "Q4"))
-        angles = log.stream(name, ("Roll", "Pitch", "Yaw"))
-        stream = quaternion or angles
-        if stream is None:
-            continue
-        if quaternion is not None:
-            table = dict(zip(("qw", "qx", "qy", "qz"), quaternion.values.T, strict=True))
-        else:
-            table = dict(zip(("roll", "pitch", "yaw"), np.radians(stream.values.T), strict=True))
-        R_eb = tabular.attitude(table)
-        if R_eb is not None and np.isfinite(R_eb).any():
-            return Stream(stream.name, stream.t_s, R_eb.reshape(-1, 9)), kind
-    return None, "filter"

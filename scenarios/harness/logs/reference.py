@@ -36,7 +36,7 @@ KNOWN = {  # by the name of the set: its receiver does not filter, but it may be
     "C40": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.25},
 }
 SETTINGS: dict[str, dict[str, Any]] = {  # of the originals, by the end of the name of their output
-    "_ap2013_gps": {"quirks": "JULY_2013", "use_compass": 0.0},
+    "_ap2013_gps": {"quirks": "JULY_2013", "use_magnetometer": False},
     "_ap2013_mag": {"quirks": "JULY_2013"},
     "_ap2013_mag_nogps_copter": {"quirks": "JULY_2013", "fly_forward": 0.0},
     "_mp_gpscent": {"centrifugal_from_gps": 1.0, "keep_tilt": 0.0},

@@ -1,11 +1,12 @@
 """From the messages of an autopilot's log, each kind with times of its own, to rows at the times of the inertial unit.
 
 Whatever else was logged is put into the tick in which it arrived, the first whose end is not before its time, and
-held from there on; of several that arrived in one tick the last one counts.
+held from there on; of several that arrived in one tick the last one counts.  What arrived while no inertial samples
+were logged is left out: in the next row it would pass for new.  Every message is accounted for in the ledger.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,13 +15,25 @@ import pymap3d  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
+from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
-from scenarios.harness.logs import checks, tabular
-from scenarios.harness.logs.recorded import RecordedLog, Reference
+from estimator.screening import LONGEST_GAP_S
+from scenarios.harness.logs import checks, gaps, tabular
+from scenarios.harness.logs.checks import AGAIN, NO_NUMBER
+from scenarios.harness.logs.ledger import Ledger
+from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
-MISSED = 1.5  # a row so many intervals after the one before does not follow it: samples between were not logged
 Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
+SLOWEST_S = 0.1  # an inertial unit logged more slowly is not to be integrated
+LOST_S, LOST_REPORTS = 2.0, 3.0  # a fix no longer holds after this silence, or so many usual intervals, if longer
+CLIMB_M = 5.0  # a receiver whose height changed by more than this, at no vertical velocity, does not report one
+FAR = "at a time far from its neighbours"
+OUTSIDE, IN_GAP = "outside the inertial record", "in a gap of the inertial record"
+REPLACED = "replaced by a later one in the same row"
+NO_FIX, UNHEALTHY = "no fix of three dimensions", "unhealthy"
+NO_ATTITUDE, NO_ROW, ALONE = "no attitude", "no inertial sample beside it", "no other attitude within 0.5 s"
 _BY_NAME = ("gyro.x", "gyro.y", "gyro.z", "force.x", "force.y", "force.z")
+_HAS = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,33 +41,53 @@ class Stream:
     """Messages of one kind.
 
     name : in the log      t_s : shape (n,), by the clock aboard      values : shape (n, m)
+    why : shape (n,), why the log itself says that a message is not to be used, empty where it does not
+    optional : how many of the last columns may be without a number
+    lost : shape (n,), messages which say that the last one no longer holds, or None
     """
 
     name: str
     t_s: Array
     values: Array
+    why: NDArray[np.object_]
+    optional: int = 0
+    lost: NDArray[np.bool_] | None = None
+
+    @classmethod
+    def of(cls, name: str, t_s: Array, values: Array) -> "Stream":
+        """Messages all of which may be used."""
+        return cls(name, t_s, values, np.full(len(t_s), "", object))
+
+    def without(self, where: NDArray[np.bool_], reason: str) -> "Stream":
+        """The same, without those messages `where`, unless there was a reason before."""
+        why = self.why.copy()
+        why[np.asarray(where) & (why == "")] = reason
+        return replace(self, why=why)
 
 
 @dataclass(frozen=True, slots=True)
 class Messages:
     """What an autopilot logged, in our units; None where it did not.
 
-    inertial : gyro x y z, specific force x y z      dt_s : shape (n,), its intervals, NaN where the log does not tell
+    inertial : gyro x y z, specific force x y z      dt_s : shape (n,), its intervals, NaN where not logged
     names : our names of the columns of `inertial` -> those of the log
-    fixes : latitude, longitude (degrees), altitude, velocity north east down, time at which it was true
-    field : magnetic, x y z, microtesla              airspeed, height : one column each
+    fixes : latitude, longitude (degrees), altitude, velocity north east down, time at which it was true (or NaN)
+    magnetic : field, x y z, microtesla              airspeed, height : one column each
     attitude : R_eb row by row, nine columns         kind : of the attitude
+    known : what the log says of the instruments     remedy : how to log the inertial unit fast enough
     """
 
     inertial: Stream
     dt_s: Array
     names: Mapping[str, str]
     fixes: Stream | None = None
-    field: Stream | None = None
+    magnetic: Stream | None = None
     airspeed: Stream | None = None
     height: Stream | None = None
     attitude: Stream | None = None
     kind: Kind = "filter"
+    known: Mapping[str, Known] = field(default_factory=dict)
+    remedy: str = ""
 
 
 def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
@@ -64,114 +97,224 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
     ------
     LogError      one line with the file, the message and the column
     """
-    stream, dt_s = messages.inertial, messages.dt_s
-    sane = _sane(stream, repairs)
-    stream, dt_s = replace(stream, t_s=stream.t_s[sane], values=stream.values[sane]), dt_s[sane]
-    number = np.flatnonzero(sane) + 1
-    source = checks.Source(path, messages.names, lambda k: f"{stream.name} {number[k]}")
-    keep = checks.kept(stream.t_s, dict(zip(_BY_NAME, stream.values.T, strict=True)), source, repairs)
-    rows = np.zeros(len(keep), MEASURED_DTYPE)
-    rows["t_s"] = stream.t_s[keep]
-    rows["dt_s"] = _intervals(rows["t_s"], dt_s[keep], stream.name, repairs)
-    rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(stream.values[keep], 2)
-    place = _put_fixes(rows, messages.fixes, repairs)
-    if (field := _put(rows, messages.field, "mag_new", repairs)) is not None:
+    books = _Books(Ledger(), repairs)
+    rows, source, after_gap = _inertial(path, messages, books)
+    known = {"imu_rate_hz": Known(1.0 / float(np.median(np.diff(rows["t_s"]))), "log", messages.inertial.name)}
+    ticks = _Ticks(rows, after_gap, books)
+    place = _put_fixes(ticks, messages.fixes, known)
+    if (field := ticks.put("magnetometer", messages.magnetic, "mag_new")) is not None:
         rows["mag_b_ut"] = np.nan_to_num(field)
-    if (airspeed := _put(rows, messages.airspeed, "air_new", repairs)) is not None:
+    if (airspeed := ticks.put("airspeed", messages.airspeed, "air_new")) is not None:
         rows["airspeed_m_s"] = np.nan_to_num(airspeed[:, 0])
-    height = _put(rows, messages.height, None, repairs)
+    height = ticks.put("barometer", messages.height, None)
     rows["baro_height_m"] = np.nan if height is None else height[:, 0]
-    has = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
-    instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if rows[new].any()))
-    reference = _reference(path, messages, rows["t_s"], repairs)
-    log = RecordedLog(rows, path.name, instruments, reference, tuple(repairs), place)
-    return checks.judged(log, source)
+    instruments = ("gyro", "accelerometer", *(name for name, new in _HAS.items() if rows[new].any()))
+    reference = _reference(path, messages, rows["t_s"], after_gap, books)
+    log = RecordedLog(
+        rows, path.name, instruments, reference, tuple(repairs), place, {**known, **messages.known}, books.ledger
+    )
+    log = checks.judged(log, source)
+    for stream, new in _HAS.items():
+        if stream in log.ledger:
+            log.ledger.use(stream, int(np.sum(log.rows[new] > 0)))
+    log.ledger.use("imu", len(log.rows))
+    return log
 
 
-def _sane(stream: Stream, repairs: list[str]) -> NDArray[np.bool_]:
-    """All but messages whose time is far from the median of the five about them: damaged ones, two at most in five.
+@dataclass(frozen=True, slots=True)
+class _Books:
+    """Where is written down what was left out and what was repaired."""
+
+    ledger: Ledger
+    repairs: list[str]
+
+    def open(self, name: str, stream: Stream) -> NDArray[np.bool_]:
+        """Enter a stream of the log: all that was read, and what is left out for what it says itself; the others."""
+        self.ledger.read(name, len(stream.t_s))
+        for reason, n in zip(*np.unique(stream.why.astype(str), return_counts=True), strict=True):
+            if reason:
+                self.ledger.leave_out(name, int(n), str(reason))
+        return np.asarray(stream.why == "")
+
+    def leave_out(self, name: str, good: NDArray[np.bool_], where: NDArray[np.bool_], reason: str) -> int:
+        """Take those `where` out of the `good` ones of a stream, in place; returns how many."""
+        n = int(np.sum(good & where))
+        self.ledger.leave_out(name, n, reason)
+        good &= ~where
+        return n
+
+    def leave_out_far(self, name: str, good: NDArray[np.bool_], stream: Stream) -> None:
+        """Take out messages whose time is far from those about them."""
+        at = np.flatnonzero(np.isfinite(stream.t_s))
+        wild = np.zeros(len(stream.t_s), np.bool_)
+        wild[at] = _wild(stream.t_s[at])
+        first = int(np.argmax(wild & good)) + 1
+        if n := self.leave_out(name, good, wild, FAR):
+            self.repairs.append(f"{stream.name}: {n} {FAR} left out, first {first}")
+
+
+def _wild(t_s: Array) -> NDArray[np.bool_]:
+    """Messages whose time is far from the median of the five about them: damaged ones, two at most in five.
 
     Times that increase are their own median, next to a gap too; a clock that was set stays, and is refused later.
     """
-    t_s = stream.t_s
     if len(t_s) < 3:
-        return np.ones(len(t_s), np.bool_)
+        return np.zeros(len(t_s), np.bool_)
     far = max(checks.LATEST_S, 3.0 * float(np.median(np.abs(np.diff(t_s)))))
-    wild = np.abs(t_s - median_filter(t_s, 5, mode="reflect")) > far
-    if wild.any():
-        first = int(np.argmax(wild))
-        repairs.append(f"{stream.name}: {wild.sum()} at a time far from its neighbours left out, first {first + 1}")
-    return ~wild
+    return np.asarray(np.abs(t_s - median_filter(t_s, 5, mode="reflect")) > far)
+
+
+def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[Any], checks.Source, NDArray[np.bool_]]:
+    """Rows with the inertial samples alone, how the log names a place in it, and rows before which samples miss."""
+    stream = messages.inertial
+    good = books.open("imu", stream)
+    books.leave_out_far("imu", good, stream)
+    number = np.flatnonzero(good) + 1
+    source = checks.Source(path, messages.names, lambda k: f"{stream.name} {number[k]}")
+    stream = replace(stream, t_s=stream.t_s[good], values=stream.values[good])
+    by_name = dict(zip(_BY_NAME, stream.values.T, strict=True))
+    keep = checks.kept(stream.t_s, by_name, source, books.repairs, books.ledger)
+    rows = np.zeros(len(keep), MEASURED_DTYPE)
+    rows["t_s"] = stream.t_s[keep]
+    usual_s = float(np.median(np.diff(rows["t_s"]))) if len(rows) > 1 else 0.0
+    if usual_s > 1.05 * SLOWEST_S:  # by more than jitter
+        why = f"{stream.name} was logged every {usual_s:g} s; {SLOWEST_S} s or less can be replayed"
+        raise LogError(f"{path}: {why}{messages.remedy and f': {messages.remedy}'}")
+    if len(rows) < 2:
+        raise source.refusal(None, "time", "a log of one row")
+    rows["dt_s"] = _intervals(rows["t_s"], messages.dt_s[good][keep], stream.name, books.repairs)
+    rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(stream.values[keep], 2)
+    return rows, source, gaps.missing(rows["t_s"], np.full(len(rows), usual_s))
 
 
 def _intervals(t_s: Array, dt_s: Array, name: str, repairs: list[str]) -> Array:
-    """Intervals that the log tells, NaN where the one before was not logged: then the row stands for the time since."""
-    steps = np.diff(t_s, prepend=t_s[0] - dt_s[0])
-    missed = steps > MISSED * dt_s
-    if 2 * missed.sum() > len(t_s):
+    """Intervals as logged, NaN where the one before was not logged: then the row stands for the time since."""
+    told = (dt_s > 0.0) & (dt_s <= LONGEST_GAP_S)
+    if not told.any():
+        return np.full(len(t_s), np.nan)
+    usual_s, steps = float(np.median(dt_s[told])), np.diff(t_s)
+    if np.median(steps) > gaps.LONG * usual_s:
         repairs.append(
-            f"{name}: means over {1e3 * np.median(dt_s[missed]):g} ms logged every {1e3 * np.median(steps):g} ms; "
+            f"{name}: means over {1e3 * usual_s:g} ms logged every {1e3 * np.median(steps):g} ms; "
             "each stands for the time since the one before"
         )
         return np.full(len(t_s), np.nan)
-    return np.where(missed, np.nan, dt_s)
+    missing = gaps.missing(t_s, np.where(told, dt_s, usual_s))
+    return np.where(told & ~missing, dt_s, np.nan)
 
 
-def _arrived(rows: NDArray[Any], stream: Stream, repairs: list[str]) -> tuple[Array, NDArray[np.intp]]:
-    """The messages that have a place in the rows, in order of time, shape (n, m), and the row of each."""
-    known = np.isfinite(stream.t_s) & np.isfinite(stream.values).all(axis=1)
-    if not known.all():
-        repairs.append(f"{stream.name}: {(~known).sum()} without a number left out")
-    stream = replace(stream, t_s=stream.t_s[known], values=stream.values[known])
-    sane = _sane(stream, repairs)
-    t_s, values = stream.t_s[sane], stream.values[sane]
-    late = np.count_nonzero(np.diff(t_s) < 0.0)
-    if late:
-        repairs.append(f"{stream.name}: {late} out of order, sorted")
-    order = np.argsort(t_s, kind="stable")
-    order = order[t_s[order] > rows["t_s"][0] - checks.LATEST_S]  # older ones were no news any more
-    at = np.searchsorted(rows["t_s"], t_s[order])
-    inside = at < len(rows)
-    return values[order][inside], at[inside]
+class _Ticks:
+    """The rows, into which messages are put as they arrived."""
+
+    def __init__(self, rows: NDArray[Any], after_gap: NDArray[np.bool_], books: _Books) -> None:
+        self.rows, self.after_gap, self.books = rows, after_gap, books
+        self.most_s = gaps.LONG * float(np.median(np.diff(rows["t_s"])))  # from arrival to the end of the tick
+
+    def placed(self, name: str, stream: Stream) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Messages that count, by their number in the stream, and the row of each; in order of time."""
+        books, t_s, rows_s = self.books, stream.t_s, self.rows["t_s"]
+        good = books.open(name, stream)
+        needed = stream.values[:, : stream.values.shape[1] - stream.optional]
+        broken = ~(np.isfinite(t_s) & np.isfinite(needed).all(axis=1))
+        if n := books.leave_out(name, good, broken, NO_NUMBER):
+            books.repairs.append(f"{stream.name}: {n} without a number left out")
+        books.leave_out_far(name, good, stream)
+        kept = np.flatnonzero(good)
+        if late := np.count_nonzero(np.diff(t_s[kept]) < 0.0):
+            books.repairs.append(f"{stream.name}: {late} out of order, sorted")
+        at = np.searchsorted(rows_s, np.where(good, t_s, 0.0))
+        row = np.minimum(at, len(rows_s) - 1)
+        early = t_s < rows_s[row] - self.most_s
+        books.leave_out(name, good, (at == len(rows_s)) | ((at == 0) & early), OUTSIDE)
+        books.leave_out(name, good, self.after_gap[row] & early, IN_GAP)
+        kept = np.flatnonzero(good)
+        kept = kept[np.argsort(t_s[kept], kind="stable")]
+        last = np.append(np.diff(at[kept]) > 0, True)[: len(kept)]
+        books.ledger.leave_out(name, int(np.sum(~last)), REPLACED)
+        return kept[last], at[kept[last]]
+
+    def put(self, name: str, stream: Stream | None, new: str | None) -> Array | None:
+        """Mark where messages arrive in the column `new`; their values held, shape (N, m), NaN before the first."""
+        if stream is None:
+            return None
+        message, at = self.placed(name, stream)
+        arrived = np.zeros(len(self.rows), np.bool_)
+        arrived[at] = True
+        if new is not None:
+            self.rows[new] = arrived
+        else:
+            self.books.ledger.use(name, int(arrived.sum()))
+        last = np.cumsum(arrived)  # how many so far
+        return np.vstack((np.full(stream.values.shape[1], np.nan), stream.values[message]))[last]
 
 
-def _put(rows: NDArray[Any], stream: Stream | None, new: str | None, repairs: list[str]) -> Array | None:
-    """Mark where messages arrive in the column `new`; their values held, shape (N, m), NaN before the first."""
-    if stream is None:
+def _put_fixes(ticks: _Ticks, fixes: Stream | None, known: dict[str, Known]) -> tuple[float, float] | None:
+    """Fill the GPS columns, and what they tell of the receiver; the place of the first fix, the origin of positions."""
+    rows = ticks.rows
+    held = ticks.put("gps", fixes, "gps_new")
+    new = rows["gps_new"] > 0
+    if fixes is None or held is None or not new.any():
         return None
-    values, at = _arrived(rows, stream, repairs)
-    last = np.full(len(rows), -1)
-    last[at] = np.arange(len(at))
-    if new is not None:
-        rows[new] = last >= 0
-    last = np.maximum.accumulate(last)
-    return np.vstack((values, np.full(values.shape[1], np.nan)))[last]  # of -1 the NaN at the end
-
-
-def _put_fixes(rows: NDArray[Any], fixes: Stream | None, repairs: list[str]) -> tuple[float, float] | None:
-    """Fill the GPS columns; returns latitude and longitude of the first fix, the origin of positions."""
-    held = _put(rows, fixes, "gps_new", repairs)
-    if held is None or not rows["gps_new"].any():
-        return None
-    known = np.isfinite(held[:, 0])
-    latitude, longitude, altitude, n, e, d, true_s = held[known].T
+    ever = np.isfinite(held[:, 0])
+    latitude, longitude, altitude, n, e, d, true_s = held[ever].T
     origin = latitude[0], longitude[0], altitude[0]
-    rows["gps_valid"] = known
-    rows["gps_t_s"][known] = true_s
-    rows["gps_p_e_m"][known] = np.column_stack(pymap3d.geodetic2ned(latitude, longitude, altitude, *origin))
-    rows["gps_v_e_m_s"][known] = np.column_stack((n, e, d))
-    rows["gps_speed_m_s"][known] = np.hypot(n, e)
-    rows["gps_course_rad"][known] = np.arctan2(e, n) % (2.0 * np.pi)
+    rows["gps_valid"] = _holds(rows, fixes)
+    rows["gps_t_s"][ever] = true_s
+    rows["gps_p_e_m"][ever] = np.column_stack(pymap3d.geodetic2ned(latitude, longitude, altitude, *origin))
+    rows["gps_v_e_m_s"][ever] = np.column_stack((n, e, d))
+    rows["gps_speed_m_s"][ever] = np.hypot(n, e)
+    rows["gps_course_rad"][ever] = np.arctan2(e, n) % (2.0 * np.pi)
+    at_s = rows["t_s"][new]
+    if len(at_s) > 2:
+        known["gps_rate_hz"] = Known(1.0 / float(np.median(np.diff(at_s))), "log", fixes.name)
+    known["gps_stamped"] = Known(bool(np.isfinite(rows["gps_t_s"][new]).mean() > 0.5), "log", fixes.name)
+    if np.any(rows["gps_v_e_m_s"][new, 2] != 0.0):
+        known["gps_vertical_velocity"] = Known(True, "log", fixes.name)
+    elif np.ptp(rows["gps_p_e_m"][new, 2]) > CLIMB_M:
+        known["gps_vertical_velocity"] = Known(False, "log", fixes.name)
     return float(origin[0]), float(origin[1])
 
 
-def _reference(path: Path, messages: Messages, t_s: Array, repairs: list[str]) -> Reference | None:
+def _holds(rows: NDArray[Any], fixes: Stream) -> NDArray[np.bool_]:
+    """Rows in which the last fix is usable: neither has the receiver lost it since, nor has it been silent for long."""
+    t_s, new = rows["t_s"], rows["gps_new"] > 0
+    fixed = np.maximum.accumulate(np.where(new, np.arange(len(rows)), -1))
+    usual_s = float(np.median(np.diff(t_s[new]))) if new.sum() > 1 else 0.0
+    holds = (fixed >= 0) & (t_s - t_s[fixed] <= max(LOST_S, LOST_REPORTS * usual_s))
+    if fixes.lost is not None and fixes.lost.any():
+        at = np.searchsorted(t_s, fixes.t_s[fixes.lost & np.isfinite(fixes.t_s)])
+        lost = np.full(len(rows), -1)
+        lost[at[at < len(rows)]] = at[at < len(rows)]
+        holds &= fixed >= np.maximum.accumulate(lost)
+    return holds
+
+
+def _reference(
+    path: Path, messages: Messages, t_s: Array, after_gap: NDArray[np.bool_], books: _Books
+) -> Reference | None:
     """The attitude at the times of the rows, interpolated; None where there is none at any of them."""
     stream = messages.attitude
     if stream is None:
         return None
-    sane = _sane(stream, repairs)
-    R_eb = tabular.at_times(stream.t_s[sane], stream.values[sane].reshape(-1, 3, 3), t_s)
-    if not np.isfinite(R_eb).any():
-        return None
-    return Reference(R_eb, messages.kind, f"{stream.name} in {path.name}")
+    good = books.open("reference", stream)
+    books.leave_out("reference", good, ~(np.isfinite(stream.t_s) & np.isfinite(stream.values).all(axis=1)), NO_ATTITUDE)
+    books.leave_out_far("reference", good, stream)
+    times, first = np.unique(stream.t_s[good], return_index=True)
+    books.ledger.leave_out("reference", int(good.sum()) - len(times), AGAIN)
+    R_eb = tabular.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
+    known = np.isfinite(R_eb).all(axis=(1, 2))
+    used = np.zeros(len(times), np.bool_)
+    if known.any():
+        after = np.clip(np.searchsorted(times, t_s[known]), 1, len(times) - 1)
+        used[after] = used[after - 1] = True  # between which an attitude was interpolated
+    books.ledger.use("reference", int(used.sum()))
+    unused = ~used
+    near = np.diff(times) <= LONGEST_GAP_S
+    alone = ~(np.append(near, False) | np.insert(near, 0, False))[: len(times)]
+    row = np.searchsorted(t_s, times)
+    gap = np.append(after_gap, False)[row]
+    books.leave_out("reference", unused, (times < t_s[0]) | (times > t_s[-1]), OUTSIDE)
+    books.leave_out("reference", unused, gap, IN_GAP)
+    books.leave_out("reference", unused, alone, ALONE)
+    books.leave_out("reference", unused, np.ones(len(times), np.bool_), NO_ROW)
+    return Reference(R_eb, messages.kind, f"{stream.name} in {path.name}") if known.any() else None

@@ -1,25 +1,30 @@
 """PX4's logs (.ulg), read with pyulog: sensor_combined or vehicle_imu, GPS, magnetometer, air data, attitude.
 
-Damaged bytes are taken out before, since pyulog gives up the rest of a log where they look like a long message.
-
 PX4's axes are ours: forward, right, down against north, east, down; its quaternions are w, x, y, z from body to earth.
 Where the simulator's attitude was logged (vehicle_attitude_groundtruth) it is the truth, else vehicle_attitude is
-what was flown on.
+what was flown on.  Until 2017 the magnetometer and the barometer were in sensor_combined.
+
+A fix was true at its ``timestamp_sample``, unless that is 0 or less than 10 ms before its arrival: drivers that do not
+know it fill in the time of arrival.
 """
 
 import contextlib
 import io
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import streams, tabular
+from scenarios.harness.logs import foreign, px4, streams, tabular
+from scenarios.harness.logs.ardupilot import FLYING_M_S
 from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import Kind, Stream
+from scenarios.harness.logs.streams import NO_FIX, Kind, Stream
+from scenarios.harness.logs.ulog_bytes import whole
 
 ATTITUDES: tuple[tuple[str, Kind], ...] = (
     ("vehicle_attitude_groundtruth", "truth"), ("vehicle_attitude", "filter"),
@@ -30,18 +35,16 @@ TOPICS = [
 ]  # fmt: skip
 FIX_3D = 3
 GAUSS_UT = 100.0
-HEADER_LENGTH, FLAGS_LENGTH = 16, 43
-SHORTEST, LONGEST = 2, 8192  # bodies: of a dropout; no definition of a topic comes near the other
-KINDS = frozenset(b"BFIMPQARDLCSO")  # of messages, by their letter
-DATA, ANNOUNCED, FORMAT, FLAGS = b"DAFB"
-SLOWEST_S = 0.1  # vehicle_imu is by default logged twice a second, for statistics: not to be integrated
-NO_FORCE = 0x7FFFFFFF  # sensor_combined.accelerometer_timestamp_relative where there is no accelerometer
+NOT_THERE = 0x7FFFFFFF  # sensor_combined.*_timestamp_relative of a sensor without a sample
+SOONEST_S, LATEST_S = 0.01, 2.0  # a fix arrives no sooner after it was true; and no later
+NO_VELOCITY, NOT_MEASURED = "no velocity (vel_ned_valid is 0)", "not measured: from ground speed and wind"
+Topic = Mapping[str, NDArray[Any]]
 
 
 def read(path: Path, imu: int | None = None) -> RecordedLog:
     """The log at `path`.
 
-    imu : which instance of vehicle_imu; unless told sensor_combined, which was flown on
+    imu : which instance of vehicle_imu; by default sensor_combined, which was flown on
 
     Raises
     ------
@@ -50,66 +53,22 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     repairs: list[str] = []
     log = _Log(path, repairs)
     inertial, dt_s, names = _inertial(log, imu)
+    fixes, receiver = _fixes(log)
+    field, compass = _switched(log, "magnetometer", _field(log))
+    airspeed, pitot = _switched(log, "airspeed", _airspeed(log))
+    height = _height(log)
+    attitude = _attitude(log)
+    if log.others:
+        repairs.append(f"of several instances one is read: {'; '.join(log.others)}")
     messages = streams.Messages(
-        inertial, dt_s, names, _fixes(log), _field(log), _airspeed(log), _height(log), *_attitude(log)
-    )
+        inertial, dt_s, names, fixes, field, airspeed, height, *attitude,
+        {**receiver, **compass, **pitot}, px4.LOG_FASTER,
+    )  # fmt: skip
     return streams.recorded(path, messages, repairs)
 
 
-def _whole(raw: bytes, repairs: list[str]) -> bytes:
-    """The log without bytes that are no whole message, which are counted.
-
-    A message is believed where another one, or the end, follows it, or it is a definition in whole words: without it
-    a topic would be lost.  Data must be of a topic that was announced, and as long as the others of it.  The places of
-    data appended after a crash are taken out, since they change.
-    """
-    end, at, since = len(raw), HEADER_LENGTH, 0
-    parts, lengths = list[bytes](), dict[int, int]()  # of each topic that was announced, 0 before its first data
-    bad, first = 0, -1
-    while at < end:
-        after = _after(raw, at)
-        known = 0 < after <= end
-        known = known and (after + 3 > end or _after(raw, after) > 0 or _is_definition(raw[at + 2 : after]))
-        kind = raw[at + 2] if known else 0
-        if kind == DATA:
-            topic = raw[at + 3] | raw[at + 4] << 8
-            usual = lengths.get(topic, -1)
-            known = usual in (0, after - at)
-            if usual == 0:
-                lengths[topic] = after - at
-        if not known:
-            parts.append(raw[since:at])
-            bad, first = bad + 1, at if first < 0 else first
-            at = since = at + 1
-            continue
-        if kind == ANNOUNCED:
-            lengths[int.from_bytes(raw[at + 4 : at + 6], "little")] = 0
-        elif kind == FLAGS and after - at >= FLAGS_LENGTH:
-            parts += (raw[since : at + 19], bytes(24))
-            since = at + FLAGS_LENGTH
-        at = after
-    parts.append(raw[since:])
-    if bad:
-        repairs.append(f"{bad} bytes that are no whole message left out, first at byte {first}")
-    return b"".join(parts)
-
-
-def _is_definition(message: bytes) -> bool:
-    """Whether the message, from its letter on, defines or announces a topic in printable letters to its end."""
-    text = message[1:] if message[0] == FORMAT else message[4:] if message[0] == ANNOUNCED else b""
-    return bool(text) and text.isascii() and text.decode().isprintable()
-
-
-def _after(raw: bytes, at: int) -> int:
-    """Where the message that begins at `at` would end; 0 where none does."""
-    if at + 3 > len(raw) or raw[at + 2] not in KINDS:
-        return 0
-    length = raw[at] | raw[at + 1] << 8
-    return at + 3 + length if SHORTEST <= length <= LONGEST else 0
-
-
 class _Log:
-    """The topics of a log by name and instance."""
+    """The topics of a log by name and instance, and its parameters; `others` lists what was read of several."""
 
     def __init__(self, path: Path, repairs: list[str]) -> None:
         try:
@@ -118,31 +77,57 @@ class _Log:
             raise LogError(f'{path}: logs of PX4 need pyulog: pip install "wingslevel[logs]"') from error
         self.path = path
         try:
-            whole = _whole(path.read_bytes(), repairs)
+            raw = path.read_bytes()
+            foreign.refuse(path, raw, "a ULog file of PX4 (.ulg)")
+            clean = whole(path, raw, repairs)
             with contextlib.redirect_stdout(io.StringIO()):  # it prints what it found damaged
-                log = ULog(io.BytesIO(whole), TOPICS)
+                self._log = ULog(io.BytesIO(clean), TOPICS)
+        except LogError:
+            raise
         except OSError as error:
             raise LogError(f"{path}: cannot be read: {error.strerror}") from error
         except Exception as error:  # pyulog raises whatever its parser meets in a file that is none or damaged
             raise LogError(f"{path}: cannot be read as a ULog file: {' '.join(str(error).split())}") from error
-        self.topics: dict[tuple[str, int], Mapping[str, NDArray[Any]]] = {}
-        for topic in log.data_list:
+        self.topics: dict[tuple[str, int], Topic] = {}
+        for topic in self._log.data_list:
             self.topics.setdefault((topic.name, topic.multi_id), topic.data)
-        if log.file_corruption:
+        self.others = list[str]()
+        changes = self._log.changed_parameters
+        self.parameters = px4.parameters(self._log.initial_parameters, changes, self._first_flight_us())
+        if self._log.file_corruption:
             repairs.append("messages that contradict their topic left out")
-        if log.dropouts:
-            lost_s = sum(dropout.duration for dropout in log.dropouts) / 1000.0
-            repairs.append(f"{len(log.dropouts)} times the logger could not follow, for {lost_s:.2f} s in all")
+        if self._log.dropouts:
+            lost_s = sum(dropout.duration for dropout in self._log.dropouts) / 1000.0
+            repairs.append(f"{len(self._log.dropouts)} times the logger could not follow, for {lost_s:.2f} s in all")
 
-    def first(self, *names: str) -> tuple[str, Mapping[str, NDArray[Any]]] | None:
+    def _first_flight_us(self) -> float:
+        """When the aeroplane first flew by GPS; infinite where it did not."""
+        for name in ("vehicle_gps_position", "sensor_gps"):
+            topic = self.topics.get((name, 0), {})
+            if {"vel_n_m_s", "vel_e_m_s", "fix_type"} <= set(topic):
+                fast = np.hypot(topic["vel_n_m_s"], topic["vel_e_m_s"]) > FLYING_M_S
+                flying = fast & (topic["fix_type"] >= FIX_3D)
+                return float(topic["timestamp"][np.argmax(flying)]) if flying.any() else np.inf
+        return np.inf
+
+    def first(self, *names: str) -> tuple[str, Topic] | None:
         """The lowest instance of the first of these topics that is there."""
         for name in names:
-            instances = sorted(i for n, i in self.topics if n == name)
-            if instances:
-                return name, self.topics[name, instances[0]]
+            if instances := self.instances(name):
+                return name, self.topics[name, self.one(name, instances[0])]
         return None
 
-    def columns(self, name: str, topic: Mapping[str, NDArray[Any]], *fields: str) -> Array:
+    def instances(self, name: str) -> list[int]:
+        """Those of a topic that are there."""
+        return sorted(i for n, i in self.topics if n == name)
+
+    def one(self, name: str, chosen: int) -> int:
+        """Note that the other instances of the topic are not read."""
+        if len(there := self.instances(name)) > 1:
+            self.others.append(f"{name} {chosen} of {', '.join(map(str, there))}")
+        return chosen
+
+    def columns(self, name: str, topic: Topic, *fields: str) -> Array:
         """Fields of a topic, shape (n, m).
 
         Raises
@@ -160,72 +145,130 @@ def _each(name: str, n: int = 3) -> tuple[str, ...]:
     return tuple(f"{name}[{i}]" for i in range(n))
 
 
-def _published_s(topic: Mapping[str, NDArray[Any]]) -> Array:
+def _published_s(topic: Topic) -> Array:
     return np.asarray(topic["timestamp"].astype(np.float64) / 1e6)
 
 
-def _sampled_s(topic: Mapping[str, NDArray[Any]]) -> Array:
-    """When the sample was taken, where it tells, else when it was published."""
-    told = topic.get("timestamp_sample")
-    return _published_s(topic) if told is None else np.where(told > 0, told / 1e6, _published_s(topic))
+def _sampled_s(topic: Topic) -> Array:
+    """When the sample was taken, where the topic has that, else when it was published."""
+    sampled = topic.get("timestamp_sample")
+    return _published_s(topic) if sampled is None else np.where(sampled > 0, sampled / 1e6, _published_s(topic))
 
 
 def _inertial(log: _Log, imu: int | None) -> tuple[Stream, Array, dict[str, str]]:
     """Gyro and accelerometer, intervals, and the names of the columns."""
-    combined = log.topics.get(("sensor_combined", 0))
+    combined, units = log.topics.get(("sensor_combined", 0)), log.instances("vehicle_imu")
     if imu is None and combined is not None:
         name, gyro, force, interval = "sensor_combined", "gyro_rad", "accelerometer_m_s2", "gyro_integral_dt"
         t_s, values = _published_s(combined), log.columns(name, combined, *_each(gyro), *_each(force))
         dt_s = log.columns(name, combined, interval)[:, 0]
         if combined[interval].dtype.kind != "f":  # in seconds, as a fraction, until 2017
             dt_s = dt_s / 1e6
-        lacking = combined.get("accelerometer_timestamp_relative", np.zeros(len(t_s))) == NO_FORCE
-        values[lacking, 3:] = np.nan
+        values[combined.get("accelerometer_timestamp_relative", np.zeros(len(t_s))) == NOT_THERE, 3:] = np.nan
     else:
         name, gyro, force = "vehicle_imu", "delta_angle", "delta_velocity"
-        topic = log.topics.get((name, imu or 0))
-        if topic is None:
-            which = f"{name} {imu}" if imu is not None else f"sensor_combined or {name}"
+        if not units and imu is None:
             has = ", ".join(f"{n} {i}" for n, i in sorted(log.topics)) or "none that we know"
-            raise LogError(f"{log.path}: no topic {which}; it has {has}")
+            why = "no inertial unit (topic sensor_combined or vehicle_imu)"
+            raise LogError(f"{log.path}: {why}: {px4.LOG_FASTER}; it has {has}")
+        if imu is not None and imu not in units:
+            there = f"{name} has {' and '.join(map(str, units))}" if units else f"there is no topic {name}"
+            alone = "" if combined is None else "; without --imu sensor_combined is read"
+            raise LogError(f"{log.path}: no inertial unit {imu}; {there}{alone}")
+        topic = log.topics[name, log.one(name, units[0] if imu is None else imu)]
         t_s = _sampled_s(topic)
         spans_s = log.columns(name, topic, f"{gyro}_dt", f"{force}_dt") / 1e6
         dt_s = spans_s[:, 0]
         spans_s = np.repeat(np.where(spans_s > 0.0, spans_s, np.nan), 3, axis=1)
         values = log.columns(name, topic, *_each(gyro), *_each(force)) / spans_s
-        if len(t_s) > 2 and (step := float(np.median(np.diff(t_s)))) > SLOWEST_S:
-            raise LogError(f"{log.path}: {name} was logged every {step:g} s; {SLOWEST_S} s or less can be replayed")
     names = {"time": f"{name}.timestamp", "gyro": gyro, "force": force}
     for i, axis in enumerate("xyz"):
         names |= {f"gyro.{axis}": f"{gyro}[{i}]", f"force.{axis}": f"{force}[{i}]"}
-    return Stream(name, t_s, values), dt_s, names
+    return Stream.of(name, t_s, values), dt_s, names
 
 
-def _fixes(log: _Log) -> Stream | None:
-    """Fixes of three dimensions with a velocity; degrees and metres, or as whole numbers 1e-7 degrees and mm."""
+def _fixes(log: _Log) -> tuple[Stream | None, dict[str, Known]]:
+    """Fixes, in degrees and metres, or as whole numbers 1e-7 degrees and mm; what is known of the receiver."""
     found = log.first("vehicle_gps_position", "sensor_gps")
     if found is None:
-        return None
+        return None, {
+            name: k for name, k in {"declination_rad": px4.declination(log.parameters, None, 0.0)}.items() if k
+        }
     name, topic = found
     if "latitude_deg" in topic:
         place = log.columns(name, topic, "latitude_deg", "longitude_deg", "altitude_msl_m")
     else:
         place = log.columns(name, topic, "lat", "lon", "alt") / (1e7, 1e7, 1e3)
     velocity = log.columns(name, topic, "vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
-    good = topic["fix_type"] >= FIX_3D
+    if level := bool(np.isnan(velocity[:, 2]).all()):
+        velocity[:, 2] = 0.0
+    t_s, true_s = _published_s(topic), _true_s(topic)
+    stream = Stream.of(name, t_s, np.column_stack((place, velocity, true_s)))
+    stream = stream.without(topic["fix_type"] < FIX_3D, NO_FIX)
     if "vel_ned_valid" in topic:
-        good &= topic["vel_ned_valid"] != 0
-    values = np.column_stack((place, velocity, _sampled_s(topic)))
-    return Stream(name, _published_s(topic)[good], values[good])
+        stream = stream.without(topic["vel_ned_valid"] == 0, NO_VELOCITY)
+    stream = replace(stream, optional=1, lost=stream.why != "")
+    usable = np.flatnonzero((stream.why == "") & (np.abs(place) <= (90.0, 180.0, 1e5)).all(axis=1))
+    latitude, longitude, altitude = place[usable[0]].tolist() if len(usable) else (0.0, 0.0, 0.0)
+    where = (latitude, longitude, altitude) if len(usable) else None
+    known = {
+        "gps_vertical_velocity": Known(False, "log", f"{name}.vel_d_m_s") if level else None,
+        "gps_latency_s": px4.latency(log.parameters),
+        "declination_rad": px4.declination(log.parameters, where, _year(topic)),
+    }
+    return stream, {name: value for name, value in known.items() if value is not None}
+
+
+def _true_s(topic: Topic) -> Array:
+    """When each fix was true, NaN where its stamp is none; see the module."""
+    sampled_us = topic.get("timestamp_sample")
+    if sampled_us is None:
+        return np.full(len(topic["timestamp"]), np.nan)
+    true_s = sampled_us.astype(np.float64) / 1e6
+    late_s = _published_s(topic) - true_s
+    return np.where((true_s > 0.0) & (late_s >= SOONEST_S) & (late_s <= LATEST_S), true_s, np.nan)
+
+
+def _year(topic: Topic) -> float:
+    """Decimal year of the fixes, NaN where none has a date."""
+    utc_us = topic.get("time_utc_usec", np.zeros(0))
+    dated = utc_us[utc_us > 0]
+    return 1970.0 + float(np.median(dated)) / (365.2425 * 86400e6) if len(dated) else float("nan")
+
+
+def _switched(log: _Log, what: str, stream: Stream | None) -> tuple[Stream | None, dict[str, Known]]:
+    """The stream, all of it left out where a parameter says that the sensor is not used; and that it says so."""
+    off = px4.off(log.parameters, what)
+    if stream is None or not off:
+        return stream, {}
+    return stream.without(np.ones(len(stream.t_s), np.bool_), off), {
+        f"use_{what}": Known(False, "log", off.partition(" ")[0])
+    }
+
+
+def _combined(log: _Log, sensor: str, *fields: str) -> Stream | None:
+    """Samples of a sensor that sensor_combined repeats until there is another; None where it has none."""
+    topic, relative = log.topics.get(("sensor_combined", 0)), f"{sensor}_timestamp_relative"
+    if topic is None or relative not in topic or not set(fields) <= set(topic):
+        return None
+    at = np.flatnonzero(topic[relative] != NOT_THERE)
+    sampled_us = topic["timestamp"][at].astype(np.int64) + topic[relative][at]
+    fresh = np.append(True, np.diff(sampled_us) != 0)[: len(at)]
+    if not len(at):
+        return None
+    values = log.columns("sensor_combined", topic, *fields)[at[fresh]]
+    return Stream.of(f"sensor_combined.{fields[0].partition('[')[0]}", sampled_us[fresh] / 1e6, values)
 
 
 def _field(log: _Log) -> Stream | None:
-    found = log.first("vehicle_magnetometer", "sensor_mag")
+    """The magnetic field: of vehicle_magnetometer, of sensor_combined, or as the sensor gave it."""
+    combined = _combined(log, "magnetometer", *_each("magnetometer_ga"))
+    found = log.first("vehicle_magnetometer", *(() if combined else ("sensor_mag",)))
     if found is None:
-        return None
+        return combined and replace(combined, values=GAUSS_UT * combined.values)
     name, topic = found
     fields = _each("magnetometer_ga") if name == "vehicle_magnetometer" else ("x", "y", "z")
-    return Stream(name, _published_s(topic), GAUSS_UT * log.columns(name, topic, *fields))
+    return Stream.of(name, _published_s(topic), GAUSS_UT * log.columns(name, topic, *fields))
 
 
 def _airspeed(log: _Log) -> Stream | None:
@@ -237,18 +280,28 @@ def _airspeed(log: _Log) -> Stream | None:
     true = log.columns(name, topic, "true_airspeed_m_s")
     if "indicated_airspeed_m_s" in topic:
         true = np.where(np.isfinite(true), true, log.columns(name, topic, "indicated_airspeed_m_s"))
-    return Stream(name, _published_s(topic), true)
+    stream = Stream.of(name, _published_s(topic), true)
+    if name != "airspeed_validated":
+        return stream
+    for source, first in (
+        ("airspeed_source", 1),
+        ("selected_airspeed_index", 1),
+        ("airspeed_sensor_measurement_valid", 1),
+    ):
+        if source in topic:  # else of the wind triangle, or of a model
+            stream = stream.without(topic[source] < first, NOT_MEASURED)
+    return stream
 
 
 def _height(log: _Log) -> Stream | None:
     """Barometric height above where the log begins."""
     found = log.first("vehicle_air_data")
     if found is None:
-        return None
-    name, topic = found
-    height = log.columns(name, topic, "baro_alt_meter")
-    first = height[np.isfinite(height)][:1]
-    return Stream(name, _published_s(topic), height - first if len(first) else height)
+        stream = _combined(log, "baro", "baro_alt_meter")
+    else:
+        stream = Stream.of(found[0], _published_s(found[1]), log.columns(*found, "baro_alt_meter"))
+    first = np.zeros(0) if stream is None else stream.values[np.isfinite(stream.values)][:1]
+    return stream if stream is None or not len(first) else replace(stream, values=stream.values - first)
 
 
 def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
@@ -259,5 +312,5 @@ def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
         quaternion = log.columns(name, found[1], *_each("q", 4))
         R_eb = tabular.attitude(dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)))
         if R_eb is not None and np.isfinite(R_eb).any():
-            return Stream(name, _sampled_s(found[1]), R_eb.reshape(-1, 9)), kind
+            return Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9)), kind
     return None, "filter"

@@ -1,0 +1,45 @@
+"""Where samples are missing, told apart from time stamps that merely jitter.
+
+A sample that was stamped late is followed by a short step, one that was lost is not: after a loss all times stay behind
+the grid of the usual interval.  So a step counts as a gap where it is long and the times after it are later on the
+whole, relative to that grid, than the times before it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.interface import Array
+from estimator.screening import LONGEST_GAP_S
+
+LONG = 1.5  # in usual intervals: a step up to this long is no gap, whatever follows
+BEHIND = 0.6  # in usual intervals: how much later the times after a gap are, on the whole
+SIDE = 15  # rows on either side over which the lateness is averaged
+
+
+def missing(t_s: Array, interval_s: Array) -> NDArray[np.bool_]:
+    """Rows before which samples are missing.
+
+    Parameters
+    ----------
+    t_s : shape (N,), increasing
+    interval_s : shape (N,), the usual interval of each row, s
+
+    Returns
+    -------
+    shape (N,)      true at the first row after a gap; never at row 0
+    """
+    steps = np.diff(t_s, prepend=t_s[0] - interval_s[0])
+    gaps = np.asarray(steps > LONGEST_GAP_S)
+    gaps[0] = False
+    late_s = np.where(gaps, 0.0, steps - interval_s)  # by how much each row is later than the grid of the one before
+    long = np.flatnonzero((steps > LONG * interval_s) & ~gaps)
+    for k in long[np.argsort(-steps[long], kind="stable")]:
+        if k == 0:
+            continue
+        first, end = max(k - SIDE, 0), min(k + SIDE, len(t_s))
+        behind_s = np.cumsum(late_s[first:end])
+        jump_s = behind_s[k - first :].mean() - behind_s[: k - first].mean()
+        if jump_s > BEHIND * interval_s[k]:
+            gaps[k] = True
+            late_s[k] -= max(round(steps[k] / interval_s[k]) - 1, 1) * interval_s[k]  # no longer counts for the others
+    return gaps

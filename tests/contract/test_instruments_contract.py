@@ -1,0 +1,139 @@
+"""What is known of the instruments arrives: every suite, every estimator, every autopilot, every command's way in."""
+
+import json
+import math
+
+import pytest
+
+from estimator import ESTIMATORS
+from estimator.instruments import PROPERTIES, Instruments, Known
+from scenarios.harness.aboard import instruments_of
+from scenarios.harness.config import override, resolve
+from scenarios.harness.flight import fly_scenario
+from scenarios.harness.plugins import equipped, equipped_autopilot
+from scenarios.harness.registry import find
+from sim.params import dotted_fields
+from sim.sensors.fitting import SUITES
+
+TURNS = find("turns_180")
+
+
+def aboard(suite, **changes):
+    """The record of a flight with that suite."""
+    return instruments_of(resolve(override(TURNS.config, {"suite": suite, **changes})))
+
+
+def own_parameters(estimator):
+    """Names of its parameters, found by constructing it and nothing else."""
+    params = getattr(equipped(estimator).code, "params", None)
+    return set() if params is None else set(dotted_fields(params))
+
+
+@pytest.mark.parametrize("suite", sorted(SUITES))
+@pytest.mark.parametrize("estimator", sorted(ESTIMATORS))
+def test_every_known_property_arrives_at_every_estimator_that_has_a_parameter_for_it(suite, estimator):
+    """The value of the data sheet stands in its parameters, and is reported; nothing else is."""
+    record = aboard(suite)
+    code, known = equipped(estimator, record)
+    wanted = own_parameters(estimator) & set(PROPERTIES)
+    assert known.keys() == wanted
+    for name in wanted & record.given.keys():
+        assert getattr(code.params, name) == record[name].value, name
+        assert known[name] == record[name]
+
+
+@pytest.mark.parametrize("suite", sorted(SUITES))
+def test_every_receiver_is_known_as_its_part_file_says(suite):
+    """Filter and latency of the part itself, read from the parameters of the suite; the autopilot's filter too."""
+    record, gps = aboard(suite), SUITES[suite].gps
+    assert record["gps_filter_s"][:2] == (gps.filter_s, "data sheet")
+    assert record["gps_latency_s"][:2] == (gps.latency_s, "data sheet")
+    assert record["gps_rate_hz"][:2] == (gps.rate_hz, "data sheet")
+    assert record["gps_vertical_velocity"].value is (gps.resolution != "nmea")
+    assert record["use_airspeed"].value is (SUITES[suite].airspeed is not None)
+    pilot = equipped_autopilot("dcm", "course", "endurance", record)
+    assert pilot.code.params.guidance.gps_filter_s == gps.filter_s
+    assert pilot.known.keys() == {"gps_filter_s"}
+
+
+@pytest.mark.parametrize("suite", sorted(SUITES))
+def test_known_is_the_same_for_every_seed(suite):
+    """A draw of the seed is nothing that anybody could know."""
+    records = [dict(aboard(suite, seed=seed, flight=flight)) for seed, flight in ((0, 0), (1, 0), (1, 3), (77, 0))]
+    assert all(record == records[0] for record in records)
+
+
+@pytest.mark.parametrize("name", sorted(PROPERTIES))
+def test_property_that_is_set_wins_over_data_sheet_and_log_and_survives_json(name):
+    """By the user, whoever else says something, and also where it is withheld."""
+    value = name.startswith(("use_", "gps_stamped", "gps_vertical")) or 0.125
+    record = Instruments({name: Known(0.5, "data sheet")}, {name: value}, [name])
+    assert record[name] == (value, "set", "")
+    assert Known.from_json(json.loads(json.dumps(record[name].to_json()))) == record[name]
+
+
+def test_property_without_knowledge_is_assumed_or_unknown():
+    """A present-day receiver: no filter, a latency between 0.1 and 0.5 s that is not certain, no stamps."""
+    record = Instruments()
+    assert record["gps_filter_s"] == (0.0, "assumed", "")
+    assert record["gps_latency_s"].source == "assumed"
+    assert 0.1 <= record.value("gps_latency_s") <= 0.5
+    assert record.value("gps_stamped") is False
+    assert record["declination_rad"] == (None, "unknown", "")
+    assert {entry.source for entry in record.values()} == {"assumed", "unknown"}
+    assert Known.from_json(Known(math.inf, "data sheet").to_json()) == (math.inf, "data sheet", "")
+
+
+def test_latency_that_is_set_is_exact_and_stamps_do_not_overrule_it():
+    """What the user sets is never accepted and then ignored."""
+    sheet = {"gps_latency_s": Known(0.3, "data sheet"), "gps_stamped": Known(True, "data sheet")}
+    assert Instruments(sheet).value("gps_stamped") is True
+    assert Instruments(sheet).value("gps_latency_sigma_s") == 0.02
+    record = Instruments(sheet, {"gps_latency_s": 0.8})
+    assert (record.value("gps_stamped"), record.value("gps_latency_sigma_s")) == (False, 0.0)
+    assert Instruments(sheet, {"gps_latency_s": 0.8, "gps_stamped": True}).value("gps_stamped") is True
+
+
+class Asks:
+    """A person's own estimator that asks for a property, and for the record."""
+
+    seen = None
+
+    def __init__(self, gps_latency_s, instruments):
+        Asks.seen = gps_latency_s, instruments
+
+    def update(self, m):
+        raise NotImplementedError
+
+
+def test_own_class_is_given_what_its_constructor_asks_for():
+    """By name, from a file or as a class from Python; what it is given is reported."""
+    for spec in (Asks, f"{__file__}:Asks"):
+        made = equipped(spec, aboard("apm2"), {"gps_latency_s": 0.7})
+        latency_s, record = type(made.code).seen
+        assert latency_s == 0.7
+        assert record["gps_latency_s"] == (0.7, "set", "")
+        assert record["gps_filter_s"].value == SUITES["apm2"].gps.filter_s
+        assert made.known.keys() == set(PROPERTIES)
+
+
+def test_estimator_that_a_function_makes_keeps_the_parameters_it_was_made_with():
+    """Whoever constructs an estimator in Python has set its parameters."""
+    from estimator.premerlani import Premerlani, PremerlaniParams
+
+    def make():
+        return Premerlani(PremerlaniParams(gps_latency_s=0.9))
+
+    assert equipped(make, aboard("apm2")).code.params.gps_latency_s == 0.9
+    assert equipped(Premerlani, aboard("apm2")).code.params.gps_latency_s == SUITES["apm2"].gps.latency_s
+
+
+def test_flight_from_python_knows_its_instruments_and_keeps_them():
+    """The class flown from Python is given the same as by name, and the manifest says what."""
+    from estimator.premerlani import Premerlani
+
+    changes = {"suite": "apm2", "duration_s": 0.5}
+    manifests = [fly_scenario(TURNS, changes, estimator=spec).manifest for spec in ("premerlani", Premerlani)]
+    assert manifests[0]["known_to_estimator"] == manifests[1]["known_to_estimator"]
+    assert manifests[0]["known_to_estimator"]["gps_latency_s"] == {"value": 0.2, "source": "data sheet"}
+    assert manifests[0]["known"].keys() == set(PROPERTIES)
