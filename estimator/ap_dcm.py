@@ -41,14 +41,13 @@ from estimator.compiled import BELIEF, WIND, Compiled, write_estimate, write_win
 from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.kernels import clip, wrap
-from estimator.magnetometer import believable
+from estimator.magnetometer import FIELD, take_field, write_calibration
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate
 from estimator.rotation import renormalise_exactly as renormalise_exactly
 from estimator.screening import (
     FORCE_GOOD,
     G_M_S2,
     GPS,
-    MAG,
     SCREEN,
     airspeed_came,
     attitude_at_rest,
@@ -72,13 +71,13 @@ LAUNCH_M_S2 = 7.0  # forward specific force of a throw
 CLIP_G = 0.5
 FIX_LIFE_S, FIELD_LIFE_S = 2.0, 0.5  # an older sample is none
 
-_OF_SCREEN = ("gyro_range_rad_s", "force_range_m_s2")
-_SETTINGS = tuple(f for f in fields(ApDcmParams) if f.name not in ("quirks", "use_magnetometer"))
+_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
+_SETTINGS = tuple(f for f in fields(ApDcmParams) if f.name not in ("quirks", "use_magnetometer", "calibration"))
 _PARAMS = (
     *(
         Column(f.name, (), "see ApDcmParams", integer=isinstance(f.default, int))
         for f in _SETTINGS
-        if f.name not in _OF_SCREEN
+        if f.name not in _RANGES
     ),
     Column("use_magnetometer", (), "1 where its samples are taken", integer=True),
     *(Column(quirk.value, (), "see Quirk", integer=True) for quirk in Quirk),
@@ -113,7 +112,6 @@ _STATE = (
     Column("course", (2,), "the same as a unit vector, north and east"),
     Column("speed_m_s", (), "its ground speed"),
     Column("new_course", (), "1 while the last fix has not corrected yaw", integer=True),
-    Column("field_b_ut", (3,), "last usable magnetometer sample"),
     Column("field_age_s", (), "time since it"),
     Column("new_field", (), "1 while it has not corrected yaw", integer=True),
     Column("airspeed_m_s", (), "last airspeed measured, or of the last fix less the wind"),
@@ -126,7 +124,7 @@ _STATE = (
     Column("v_wind_e_m_s", (3,), "velocity at the last wind estimate"),
     Column("wind_s", (), "when that was; before any, long ago"),
 )
-STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + _PARAMS + _STATE)
+STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + FIELD + _PARAMS + _STATE)
 
 
 @kernel
@@ -144,13 +142,8 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
             s.course[0], s.course[1] = np.cos(course), np.sin(course)
         else:
             refuse(s, GPS)
-    if row.mag_new and s.use_magnetometer:
-        if believable(row.mag_b_ut, s.field_range_ut):
-            s.new_field, s.field_age_s = 1, 0.0
-            for i in range(3):
-                s.field_b_ut[i] = row.mag_b_ut[i]
-        else:
-            refuse(s, MAG)
+    if s.use_magnetometer and take_field(row, s):
+        s.new_field, s.field_age_s = 1, 0.0
     if airspeed_came(row, s):
         s.airspeed_m_s, s.air_age_s = max(row.airspeed_m_s, 0.0), 0.0
 
@@ -473,6 +466,7 @@ class ApDcm(Compiled):
         self._state.fill(0)
         for f in _SETTINGS:
             s[f.name] = getattr(self.params, f.name)
+        write_calibration(self._state, self.params.calibration)
         use = self.params.use_magnetometer
         s["use_magnetometer"] = use is None or bool(use)
         for quirk in self.params.quirks:

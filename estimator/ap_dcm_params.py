@@ -1,10 +1,10 @@
 """Settings of `estimator.ap_dcm`: gains, options, and the original's quirks, each of which can be had or not."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
-from estimator.magnetometer import FIELD_RANGE_UT
+from estimator.magnetometer import FIELD_RANGE_UT, Calibration
 from estimator.screening import FORCE_RANGE_M_S2, GYRO_RANGE_RAD_S
 
 MOST_FIXES = 5
@@ -56,6 +56,7 @@ class ApDcmParams:
                                 fitted and calibrated, and the heading is that of the nose.  None: nobody knows, and
                                 it is taken if it comes
     declination_rad : float     of the magnetic field, east positive
+    calibration                 of the magnetometer; the original's offsets
     fly_forward : bool          an aeroplane: its course may stand for its heading, its airspeed for its motion
     estimate_wind : bool        learn the wind from turns, and from airspeed where there is a sensor
     gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
@@ -71,6 +72,7 @@ class ApDcmParams:
     gps_delay_fixes: int = 0
     use_magnetometer: bool | None = None
     declination_rad: float = 0.0
+    calibration: Calibration = field(default_factory=Calibration)
     fly_forward: bool = True
     estimate_wind: bool = True
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S

@@ -59,7 +59,7 @@ from estimator.compiled import BELIEF, Compiled, write_estimate
 from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.kernels import wrap
-from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field, turn_to_north
+from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field, turn_to_north, write_calibration
 from estimator.pi import corrected_rate, feed_back, weigh
 from estimator.rotation import integrate
 from estimator.screening import (
@@ -318,8 +318,7 @@ class Dilshad(Compiled):
         self._state.fill(0)
         for name in (*_OF_PARAMS, *_RANGES):
             s[name] = getattr(self.params, name)
-        for f in fields(Calibration):
-            s[f.name] = getattr(self.params.calibration, f.name)
+        write_calibration(self._state, self.params.calibration)
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]

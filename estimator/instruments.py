@@ -44,7 +44,8 @@ PROPERTIES: Mapping[str, Property] = {
     "force_bias_sigma_m_s2": Property("standard deviation of the accelerometer bias"),
     "imu_rate_hz": Property("inertial samples per second"),
     "declination_rad": Property("magnetic north from true north, positive to the east"),
-    "use_magnetometer": Property("whether a magnetometer is fitted and calibrated"),
+    "use_magnetometer": Property("whether a magnetometer is fitted and used"),
+    "magnetometer_calibrated": Property("whether its readings are free of iron and motor, by nature or by calibration"),
     "use_airspeed": Property("whether an airspeed sensor is fitted and used"),
 }
 """Every property: name, as parameters of estimators and autopilots spell it -> what it means."""
@@ -52,7 +53,9 @@ PROPERTIES: Mapping[str, Property] = {
 SIGMA_KNOWN_S = 0.02  # standard deviation of a latency that a data sheet or a log gives
 
 
-BOOLEAN = frozenset({"gps_stamped", "gps_vertical_velocity", "use_magnetometer", "use_airspeed"})
+BOOLEAN = frozenset(
+    {"gps_stamped", "gps_vertical_velocity", "use_magnetometer", "magnetometer_calibrated", "use_airspeed"}
+)
 """Properties that are true or false; the others are numbers."""
 
 

@@ -11,9 +11,11 @@ Multi-Rotor Autopilot", Global Journal of Researches in Engineering F 14(8), 201
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.interface import Array, Column
 from estimator.jit import inlined, kernel
@@ -130,6 +132,12 @@ FIELD = (
     Column("field_b_ut", (3,), "the last sample believed, corrected"),
 )
 """Columns of the state of an estimator that calls `take_field`."""
+
+
+def write_calibration(state: NDArray[Any], calibration: Calibration) -> None:
+    """Put a calibration into the columns FIELD of a state record, shape (1,)."""
+    for f in fields(calibration):
+        state[f.name][0] = getattr(calibration, f.name)
 
 
 @inlined

@@ -2,7 +2,7 @@
 
 import importlib
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -21,14 +21,14 @@ from estimator.interface import (
     dtype_of,
 )
 from estimator.jit import kernel
-from estimator.magnetometer import FIELD_RANGE_UT, believable, turn_to_north
+from estimator.magnetometer import FIELD as FIELD_COLUMNS
+from estimator.magnetometer import FIELD_RANGE_UT, Calibration, take_field, turn_to_north, write_calibration
 from estimator.rotation import heading_rad
 from estimator.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     GPS,
     GYRO_RANGE_RAD_S,
-    MAG,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
@@ -43,8 +43,8 @@ STATE_DTYPE = dtype_of(
     (
         *SCREEN,
         *BELIEF,
+        *FIELD_COLUMNS,
         Column("force_b_m_s2", (3,), "the accelerometer's last sample"),
-        Column("mag_b_ut", (3,), "the magnetometer's last sample"),
         Column("course_rad", (), "the last course that could be believed"),
         Column("course_age_s", (), "time since it came"),
     )
@@ -59,7 +59,7 @@ RIGHT_DOWN, LEFT_UP = np.ones(3), np.array([1.0, -1.0, -1.0])  # forward-left-up
 
 
 @kernel
-def _screen(rows, k, uses_field, uses_course, field_range_ut, state):  # type: ignore[no-untyped-def]
+def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped-def]
     """Judge row `k` and take what is believed of it into the state; returns the bits of what is there."""
     row, s = rows[k], state[0]
     good = screen(row, s)
@@ -68,12 +68,8 @@ def _screen(rows, k, uses_field, uses_course, field_range_ut, state):  # type: i
     take_rate(row, s, good)
     for i in range(3):
         s.force_b_m_s2[i] = row.force_b_m_s2[i]
-        s.mag_b_ut[i] = row.mag_b_ut[i]
-    if uses_field and row.mag_new:
-        if believable(row.mag_b_ut, field_range_ut):
-            good |= FIELD
-        else:
-            refuse(s, MAG)
+    if uses_field and take_field(row, s):
+        good |= FIELD
     s.course_age_s += s.dt_s
     if uses_course and row.gps_new:
         if not (abs(row.gps_course_rad) < 100.0 and 0.0 <= row.gps_speed_m_s < 1000.0):
@@ -136,11 +132,13 @@ class PeerParams:
 
     declination_rad : float     of magnetic north from true north, positive to the east; added to a magnetic heading
     use_magnetometer : bool     use the magnetometer where the package can; False for one that is not calibrated
+    calibration                 of the magnetometer: the packages are given calibrated samples
     field_range_ut : float      a reading of an axis beyond this is rejected
     """
 
     declination_rad: float = 0.0
     use_magnetometer: bool = True
+    calibration: Calibration = field(default_factory=Calibration)
     field_range_ut: float = FIELD_RANGE_UT
 
     def __post_init__(self) -> None:
@@ -148,7 +146,7 @@ class PeerParams:
             raise ValueError(f"declination_rad is {self.declination_rad} rad; it must lie between -pi and pi")
         for f in fields(self):
             value = getattr(self, f.name)
-            if f.name != "declination_rad" and not 0.0 <= value < math.inf:
+            if f.name not in ("declination_rad", "calibration") and not 0.0 <= value < math.inf:
                 raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
 
 
@@ -179,15 +177,14 @@ class Peer:
 
     def __init__(self, params: PeerParams) -> None:
         self.params = params
-        uses_field = "magnetometer" in self.uses and bool(params.use_magnetometer)
-        self._uses = (uses_field, "gps" in self.uses, float(params.field_range_ut))
+        self._uses = ("magnetometer" in self.uses and bool(params.use_magnetometer), "gps" in self.uses)
         self._state = np.zeros(1, STATE_DTYPE)
         # Views, because a field of a record takes microseconds to look up.
         (
-            self._R_eb, self._omega_b_rad_s, self._bias_b_rad_s, self._force_b_m_s2, self._mag_b_ut,
+            self._R_eb, self._omega_b_rad_s, self._bias_b_rad_s, self._force_b_m_s2, self._field_b_ut,
         ) = (
             self._state[name][0]
-            for name in ("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "force_b_m_s2", "mag_b_ut")
+            for name in ("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "force_b_m_s2", "field_b_ut")
         )  # fmt: skip
         self._dt_s, self._rejected, self._course_rad = (
             self._state[name] for name in ("dt_s", "rejected", "course_rad")
@@ -205,7 +202,8 @@ class Peer:
         s = self._state[0]
         self._state.fill(0)
         s["gyro_range_rad_s"], s["force_range_m_s2"] = GYRO_RANGE_RAD_S, FORCE_RANGE_M_S2
-        s["course_age_s"] = math.inf
+        s["course_age_s"], s["field_range_ut"] = math.inf, self.params.field_range_ut
+        write_calibration(self._state, self.params.calibration)
         self._offset_b_rad_s = np.zeros(3) if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = self._offset_b_rad_s
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
@@ -257,7 +255,7 @@ class Peer:
         """Set the heading by the field that came, or by the course, and leave the tilt as it is."""
         if by & FIELD:
             self._aligned = self._magnetic = bool(
-                turn_to_north(self._R_eb, self._mag_b_ut, self.params.declination_rad)
+                turn_to_north(self._R_eb, self._field_b_ut, self.params.declination_rad)
             )
         else:
             self._aligned = True
@@ -272,7 +270,7 @@ class Peer:
         return Heard(
             body * gyro_b_rad_s,
             body * self._force_b_m_s2 if good & FORCE_GOOD else None,
-            body * self._mag_b_ut if good & FIELD else None,
+            body * self._field_b_ut if good & FIELD else None,
             float(self._course_rad[0]) if good & COURSE else None,
             float(self._dt_s[0]),
         )

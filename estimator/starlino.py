@@ -40,7 +40,7 @@ Starlino, "DCM Tutorial - An Introduction to Orientation Kinematics", 2011, and 
 """
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -55,6 +55,7 @@ from estimator.magnetometer import (
     Calibration,
     take_field,
     turn_to_north,
+    write_calibration,
 )
 from estimator.screening import (
     FORCE_GOOD,
@@ -289,8 +290,7 @@ class Starlino(Compiled):
         self._state.fill(0)
         for name in (*_OF_PARAMS, *_RANGES):
             s[name] = getattr(self.params, name)
-        for f in fields(Calibration):
-            s[f.name] = getattr(self.params.calibration, f.name)
+        write_calibration(self._state, self.params.calibration)
         s["declination_rad"] = self.params.declination_rad
         s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         s["dcm"] = NED_FROM_NWU @ s["R_eb"]

@@ -30,7 +30,8 @@ PUBLISHED: Mapping[str, Any] = MappingProxyType(
         "rotate_history": False,
         "launch_gate": _NEVER,
         "integrate_below_rad_s": _NEVER,
-        "airspeed": False,
+        "use_airspeed": False,
+        "force_full_scale_m_s2": _NEVER,
     }
 )
 

@@ -29,7 +29,7 @@ STEP_S = 1.0 / IMU_HZ
 LAGGED: Mapping[str, Any] = MappingProxyType({"gps.filter_s": 1.0, "gps.latency_s": 0.3})
 # Of `premerlani`, what the paper's own text has: neither its gates nor what it learns of clipping and turning.
 AS_PRINTED: Mapping[str, Any] = MappingProxyType(
-    {"launch_gate": math.inf, "integrate_below_rad_s": math.inf, "airspeed": False}
+    {"launch_gate": math.inf, "integrate_below_rad_s": math.inf, "use_airspeed": False}
 )
 
 

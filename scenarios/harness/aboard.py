@@ -36,7 +36,7 @@ def instruments_of(config: FlightConfig) -> Instruments:
         declination_rad = _declination_rad(suite.magnetometer.year)
         known["declination_rad"] = Known(declination_rad, "data sheet", "world magnetic model")
     if config.turn_table:
-        known["use_magnetometer"] = Known(True, "set", "turn_table")
+        known["magnetometer_calibrated"] = Known(True, "set", "turn_table")
     return Instruments(known, config.instruments, config.withheld)
 
 

@@ -80,12 +80,14 @@ class Fixes:
     def from_log(cls, measured: NDArray[Any], accuracy: Accuracy = Accuracy()) -> "Fixes":  # noqa: B008 - immutable
         """The fixes that arrived in the rows `measured` of a log, from a receiver of known `accuracy`.
 
-        The uncertainty of the course is that of the speed across the track, over the speed.
+        The uncertainty of the course is that of the speed across the track, over the speed.  A fix of a receiver that
+        did not say when it was true, as in many recorded logs, has the time of its arrival: a message without one says
+        that there is no fix.
         """
         rows = measured[measured["gps_new"] == 1]
         n = len(rows)
         return cls(
-            t_s=rows["gps_t_s"].copy(),
+            t_s=np.where(np.isfinite(rows["gps_t_s"]), rows["gps_t_s"], rows["t_s"]),
             arrival_s=rows["t_s"].copy(),
             p_e_m=rows["gps_p_e_m"].copy(),
             v_e_m_s=rows["gps_v_e_m_s"].copy(),

@@ -30,12 +30,13 @@ def data_sheets(suite: SuiteParams, rates: Rates, origin: str = "") -> dict[str,
         **_accelerometer(suite.accelerometer, suite.board, rates),
         "imu_rate_hz": float(rates.imu_hz),
         "use_airspeed": suite.airspeed is not None,
-        "use_magnetometer": has_clean_compass(suite),
+        "use_magnetometer": suite.magnetometer is not None,
+        "magnetometer_calibrated": has_clean_magnetometer(suite),
     }
     return {name: Known(value, "data sheet", origin) for name, value in figures.items()}
 
 
-def has_clean_compass(suite: SuiteParams) -> bool:
+def has_clean_magnetometer(suite: SuiteParams) -> bool:
     """Whether a magnetometer is fitted that needs no calibration: no iron, no motor, no crooked mounting."""
     part = suite.magnetometer
     if part is None:

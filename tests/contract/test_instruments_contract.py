@@ -6,7 +6,7 @@ import math
 import pytest
 
 from estimator import ESTIMATORS
-from estimator.instruments import PROPERTIES, Instruments, Known
+from estimator.instruments import BOOLEAN, PROPERTIES, Instruments, Known
 from scenarios.harness.aboard import instruments_of
 from scenarios.harness.config import override, resolve
 from scenarios.harness.flight import fly_scenario
@@ -66,7 +66,7 @@ def test_known_is_the_same_for_every_seed(suite):
 @pytest.mark.parametrize("name", sorted(PROPERTIES))
 def test_property_that_is_set_wins_over_data_sheet_and_log_and_survives_json(name):
     """By the user, whoever else says something, and also where it is withheld."""
-    value = name.startswith(("use_", "gps_stamped", "gps_vertical")) or 0.125
+    value = name in BOOLEAN or 0.125
     record = Instruments({name: Known(0.5, "data sheet")}, {name: value}, [name])
     assert record[name] == (value, "set", "")
     assert Known.from_json(json.loads(json.dumps(record[name].to_json()))) == record[name]

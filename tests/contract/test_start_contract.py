@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import estimator as package
 from estimator.interface import MEASURED_DTYPE, ImuSample, Measurements
+from estimator.magnetometer import Calibration
 from estimator.peers import Imufusion
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
 
@@ -36,15 +37,16 @@ IN_THE_PAST = {"gps_velocity_magnetometer", "ins_ekf"}  # correct what they beli
 MAGNETIC = [n for n in package.ESTIMATORS if "magnetometer" in class_of(n).uses and n not in IN_THE_PAST]
 
 
-def made(name):
+def made(name, **known):
     """An estimator that knows of its magnetometer and of the declination."""
     make = class_of(name)
     try:
         params = make().params
     except ImportError as problem:
         pytest.skip(str(problem))
-    known = {"declination_rad": DECLINATION_RAD}
-    return make(replace(params, **known, **({"use_magnetometer": True} if hasattr(params, "use_magnetometer") else {})))
+    known |= {"declination_rad": DECLINATION_RAD}
+    known |= {"use_magnetometer": True} if hasattr(params, "use_magnetometer") else {}
+    return make(replace(params, **known))
 
 
 def held(R_eb, n=N):
@@ -88,6 +90,21 @@ def test_first_field_sets_the_heading_in_the_air(name):
     estimator.reset(None)
     error_deg = np.degrees(np.abs(heading_error_rad(flown(estimator, rows), R)))
     assert error_deg[settled(name) :].max() < MOST_DEG
+
+
+@pytest.mark.parametrize("name", MAGNETIC)
+def test_calibrated_field_sets_the_heading(name):
+    """Every one of them is told of the iron that the turn-table found: packages of others and originals too."""
+    R = Rotation.from_euler("ZYX", [110.0, -5.0, 10.0], degrees=True).as_matrix()
+    iron, hard = np.array([[1.1, 0.05, 0.0], [0.05, 0.9, 0.0], [0.0, 0.0, 1.0]]), np.array([12.0, -7.0, 20.0])
+    rows = held(R)
+    rows["mag_b_ut"] = rows["mag_b_ut"] @ iron.T + hard
+    found = Calibration(tuple(hard), tuple(map(tuple, np.linalg.inv(iron))))
+    for calibration, lowest_deg, highest_deg in ((found, 0.0, MOST_DEG), (Calibration(), 5.0, 180.0)):
+        estimator = made(name, calibration=calibration)
+        estimator.reset(ImuSample(2.0, 2.0, np.zeros(3), rows["force_b_m_s2"][0]))
+        off_deg = abs(math.degrees(float(heading_error_rad(flown(estimator, rows)[settled(name)], R))))
+        assert lowest_deg <= off_deg < highest_deg
 
 
 @pytest.mark.parametrize("what", SPOILT_UT)

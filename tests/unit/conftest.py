@@ -117,47 +117,6 @@ def demand_same_rows() -> Any:
     return same_rows
 
 
-class HandHeld:
-    """Ten seconds of turning at 50 Hz, held and not accelerated, as columns of a table; fixes every half second."""
-
-    n = 500
-    t_s = 0.02 * np.arange(1, n + 1)
-    rate = np.stack([0.8 * np.sin(2.0 * t_s), 0.4 * np.cos(1.3 * t_s), 0.3 + 0.2 * np.sin(0.7 * t_s)], axis=-1)
-
-    def __init__(self) -> None:
-        turned = [Rotation.identity()]
-        for rate in self.rate:  # exact for a rate that is constant in each interval
-            turned.append(turned[-1] * Rotation.from_rotvec(0.02 * rate))
-        self.attitude = Rotation.concatenate(turned[1:])
-        self.R_eb = self.attitude.as_matrix()
-        self.force = self.attitude.inv().apply([0.0, 0.0, -9.80665])
-
-    def columns(self, *, attitude: bool = True) -> dict[str, NDArray[Any]]:
-        """By names in use."""
-        last = np.maximum(0, (np.arange(self.n) + 1) // 25 * 25 - 1)
-        yaw, pitch, roll = self.attitude.as_euler("ZYX").T
-        return {
-            "t": self.t_s,
-            **{f"g{a}": self.rate[:, i] for i, a in enumerate("xyz")},
-            **{f"a{a}": self.force[:, i] for i, a in enumerate("xyz")},
-            "vn": 1.0 + 0.1 * last,
-            "ve": -2.0 + 0.0 * last,
-            **({"roll": roll, "pitch": pitch, "yaw": yaw} if attitude else {}),
-        }
-
-    @staticmethod
-    def lines(columns: dict[str, NDArray[Any]]) -> list[str]:
-        """The lines of a text file of these columns."""
-        table = np.column_stack(list(columns.values()))
-        return [",".join(columns), *(",".join(f"{v:.12g}" for v in row) for row in table)]
-
-
-@pytest.fixture(scope="session")
-def held() -> HandHeld:
-    """A motion as columns."""
-    return HandHeld()
-
-
 def _beside(name: str) -> ModuleType:
     """The test module of that name: test folders are no packages, from which it could be imported."""
     spec = importlib.util.spec_from_file_location(f"_{name}", Path(__file__).with_name(f"{name}.py"))
@@ -209,3 +168,44 @@ def demand_books_agree(log: RecordedLog) -> None:
 def demand_agreement() -> Any:
     """`demand_books_agree`, for tests."""
     return demand_books_agree
+
+
+class HandHeld:
+    """Ten seconds of turning at 50 Hz, held and not accelerated, as columns of a table; fixes every half second."""
+
+    n = 500
+    t_s = 0.02 * np.arange(1, n + 1)
+    rate = np.stack([0.8 * np.sin(2.0 * t_s), 0.4 * np.cos(1.3 * t_s), 0.3 + 0.2 * np.sin(0.7 * t_s)], axis=-1)
+
+    def __init__(self) -> None:
+        turned = [Rotation.identity()]
+        for rate in self.rate:  # exact for a rate that is constant in each interval
+            turned.append(turned[-1] * Rotation.from_rotvec(0.02 * rate))
+        self.attitude = Rotation.concatenate(turned[1:])
+        self.R_eb = self.attitude.as_matrix()
+        self.force = self.attitude.inv().apply([0.0, 0.0, -9.80665])
+
+    def columns(self, *, attitude: bool = True) -> dict[str, NDArray[Any]]:
+        """By names in use."""
+        last = np.maximum(0, (np.arange(self.n) + 1) // 25 * 25 - 1)
+        yaw, pitch, roll = self.attitude.as_euler("ZYX").T
+        return {
+            "t": self.t_s,
+            **{f"g{a}": self.rate[:, i] for i, a in enumerate("xyz")},
+            **{f"a{a}": self.force[:, i] for i, a in enumerate("xyz")},
+            "vn": 1.0 + 0.1 * last,
+            "ve": -2.0 + 0.0 * last,
+            **({"roll": roll, "pitch": pitch, "yaw": yaw} if attitude else {}),
+        }
+
+    @staticmethod
+    def lines(columns: dict[str, NDArray[Any]]) -> list[str]:
+        """The lines of a text file of these columns."""
+        table = np.column_stack(list(columns.values()))
+        return [",".join(columns), *(",".join(f"{v:.12g}" for v in row) for row in table)]
+
+
+@pytest.fixture(scope="session")
+def held() -> HandHeld:
+    """A motion as columns."""
+    return HandHeld()

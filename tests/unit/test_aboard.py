@@ -47,7 +47,7 @@ def test_declination_is_known_with_or_without_turning(turned):
     """13 degrees west at the launch point, from the world magnetic model; a turn makes the magnetometer usable."""
     aboard = instruments_of(config_of(turn_table=turned))
     assert aboard.value("declination_rad") == math.atan2(FIELD[1], FIELD[0])
-    assert aboard.value("use_magnetometer") is turned
+    assert (aboard.value("use_magnetometer"), aboard.value("magnetometer_calibrated")) == (True, turned)
 
 
 def test_calibration_by_hand_is_kept():

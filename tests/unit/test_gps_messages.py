@@ -325,6 +325,13 @@ def test_start_that_no_message_can_say_is_refused(encode, start: datetime, t_s: 
 # --- what is not known
 
 
+def test_fix_without_a_time_of_its_own_has_that_of_its_arrival() -> None:
+    """A recorded log does not say when its fixes were true: they are written all the same."""
+    rows = np.zeros(2, MEASURED_DTYPE)
+    rows["gps_new"], rows["t_s"], rows["gps_t_s"] = 1, [5.0, 6.0], [np.nan, 5.7]
+    np.testing.assert_array_equal(Fixes.from_log(rows).t_s, [5.0, 5.7])
+
+
 @pytest.mark.parametrize("column", ["p_e_m", "t_s"])
 def test_fix_that_is_not_finite_is_a_message_without_a_fix(column: str) -> None:
     """A receiver that reports NaN says that it has no fix; the others come back."""

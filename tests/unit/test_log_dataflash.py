@@ -41,7 +41,7 @@ RESOLUTION = {
     "gps_v_e_m_s": 2e-5, "gps_p_e_m": 0.025, "airspeed_m_s": 4e-6, "baro_height_m": 1e-5,
 }  # fmt: skip
 Message = tuple[int, str, tuple[Any, ...]]  # time, name, fields
-ONE_READ = "of several instances one is read: IMU 0 of 0, 1; GPS 0 of 0, 1"
+ONE_READ = "only one of several instances is read: IMU 0 (of 0, 1); GPS 0 (of 0, 1)"
 
 
 class Writer:

@@ -139,7 +139,7 @@ def test_airspeed_used_at_zero_throttle_is_given_while_it_was_in_use(logged, kno
         return m if m[1] != "ARSP" else (m[0], "ARSP", (*m[2][:5], int(m[0] > middle), 1))
 
     n = int(np.sum(logged.air_us <= middle))
-    for use, reason in ((2, "ARSPD_USE is 2: used at zero throttle only"), (1, "not in use by ARSP.U")):
+    for use, reason in ((2, "ARSPD_USE is 2: used at zero throttle only"), (1, "ARSP.U is 0: not in use")):
         entry = known({"ARSPD_USE": use}, change=gliding_later).ledger["airspeed"]
         assert entry.left_out == {reason: n}
         assert entry.used == len(logged.air_us) - n
@@ -150,7 +150,7 @@ def test_compass_that_the_firmware_does_not_use_is_not_given(logged, known):
     second = [(t, "MAG", (t, 1, *(5.0 * b), 1)) for t, b in zip(logged.field_us, logged.field, strict=True)]
     log = known({"COMPASS_USE": 0, "COMPASS_USE2": 1}, more=second)
     np.testing.assert_allclose(log.rows["mag_b_ut"][-1], 0.5 * logged.field[-1], rtol=0, atol=0.051)
-    assert any("MAG 1 of 0, 1" in line for line in log.repairs)
+    assert any("MAG 1 (of 0, 1)" in line for line in log.repairs)
     for off in ({"COMPASS_USE": 0, "COMPASS_USE2": 0}, {"COMPASS_ENABLE": 0, "COMPASS_USE": 1}):
         log = known(off, more=second)
         assert "magnetometer" not in log.instruments
@@ -189,6 +189,6 @@ def test_receiver_that_was_used_most_is_read(logged, known):
         return m[0], "GPS", (*fix, m[2][1])
 
     log = known(formats=used, change=second_is_used)
-    assert any("GPS 1 of 0, 1" in line for line in log.repairs)
+    assert any("GPS 1 (of 0, 1)" in line for line in log.repairs)
     expected = 1.1 * np.hypot(*logged.v_e[-1, :2])
     assert log.rows["gps_speed_m_s"][-1] == pytest.approx(expected, rel=1e-6)

@@ -43,7 +43,7 @@ def test_good_log_is_used_whole(logged, read):
         "imu": (1000, 1000, {}), "gps": (fixes, fixes, {}), "magnetometer": (fields, fields, {}),
         "airspeed": (airs, airs, {}), "barometer": (airs, airs, {}), "reference": (1000, 1000, {}),
     }  # fmt: skip
-    assert log.repairs == ("of several instances one is read: IMU 0 of 0, 1; GPS 0 of 0, 1",)
+    assert log.repairs == ("only one of several instances is read: IMU 0 (of 0, 1); GPS 0 (of 0, 1)",)
 
 
 def test_each_reason_is_counted_by_itself(logged, read):
@@ -141,7 +141,7 @@ def test_fixes_by_the_time_of_the_week_are_put_on_the_clock_of_the_log(logged, r
         np.testing.assert_array_equal(log.rows[column], expected[column])
     np.testing.assert_allclose(log.rows["gps_p_e_m"], expected["gps_p_e_m"], rtol=0, atol=0.025)
     assert log.ledger["gps"].used == len(logged.fix_us)
-    assert "GPS: no time by the clock of the log; placed by the order of the records" in log.repairs
+    assert "GPS: not on the clock of the log; placed by the order of the records" in log.repairs
 
 
 def test_fix_by_the_time_of_the_week_in_a_gap_is_left_out(logged, read):

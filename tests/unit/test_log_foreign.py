@@ -18,6 +18,7 @@ def defined(kind, name, codes, columns, size):
     return HEADER + struct.pack("<BBB4s16s64s", 128, kind, size, name, codes, columns)
 
 
+ARDUPILOT = defined(128, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns", 89)
 SDLOG2 = b"".join(
     (
         defined(128, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns", 89),
@@ -27,6 +28,13 @@ SDLOG2 = b"".join(
         HEADER + b"\x04" + struct.pack("<6f", 0.0, 0.0, -9.8, 0.0, 0.0, 0.0),
     )
 )
+WITHOUT_TIME = (
+    ARDUPILOT
+    + defined(2, b"SENS", b"ff", b"BaroPres,BaroAlt", 11)
+    + HEADER
+    + b"\x02"
+    + struct.pack("<2f", 950.0, 500.0)
+)
 
 
 @pytest.mark.parametrize(
@@ -35,13 +43,15 @@ SDLOG2 = b"".join(
         ("a.bin", b"", r"the file is empty, not an ArduPilot DataFlash log \(\.bin\)$"),
         ("a.ulg", b"", r"the file is empty, not a ULog file of PX4 \(\.ulg\)$"),
         ("a.bin", ULOG, r"not an ArduPilot DataFlash log \(\.bin\); this is a ULog file of PX4: name it \.ulg$"),
-        ("a.ulg", SDLOG2, r"not a ULog file of PX4 \(\.ulg\); this is an ArduPilot DataFlash log: name it \.bin$"),
+        ("a.ulg", ARDUPILOT, r"not a ULog file of PX4 \(\.ulg\); this is an ArduPilot DataFlash log: name it \.bin$"),
         ("a.bin", TEXT_LOG, r"an ArduPilot log as text \(\.log\): replay the \.bin that it was converted from$"),
         ("a.log", TEXT_LOG, r"this is an ArduPilot log as text \(\.log\)"),
         ("a.bin", TLOG, r"this is a MAVLink telemetry log \(\.tlog\), .*: download the log from the autopilot"),
         ("a.tlog", TLOG, r"this is a MAVLink telemetry log"),
         ("a.ulg", TLOG, r"this is a MAVLink telemetry log"),
         ("a.bin", SDLOG2, r"a log of PX4's old sdlog2 and not ArduPilot's: it cannot be read; .* \(\.ulg\)"),
+        ("a.px4log", SDLOG2, r"this is a log of PX4's old sdlog2 and not ArduPilot's: it cannot be read"),
+        ("a.bin", WITHOUT_TIME, r"a log of PX4's old sdlog2 and not ArduPilot's"),
         ("a.px4log", ULOG, r"this is a ULog file of PX4: name it \.ulg$"),
         ("a.ulg", b"PK\x03\x04" + bytes(60), r"this is a zip archive: unpack it first$"),
         ("a.bin", b"\x1f\x8b" + bytes(60), r"this is packed with gzip: unpack it first$"),

@@ -131,7 +131,7 @@ def test_books_of_a_text_log_say_why(held, tmp_path):
     entry = log.ledger["imu"]
     assert (entry.read, entry.used) == (held.n + 4, held.n - 2)
     assert entry.left_out == {
-        "without a number": 1, "time repeated": 1, "zeros before the first reading": 3,
+        "without a number": 1, "repeated time": 1, "zeros before the first reading": 3,
         "a last line that was cut off": 1,
     }  # fmt: skip
     agree(log)

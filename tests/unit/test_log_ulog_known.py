@@ -119,11 +119,13 @@ def test_airspeed_that_px4_does_not_use_is_not_given(logged, known, name, value)
     assert "airspeed" in known({"FW_ARSP_MODE": 0, "CBRK_AIRSPD_CHK": 0, "SYS_HAS_NUM_ASPD": 1}).instruments
 
 
-def test_magnetometer_that_px4_does_not_have_is_not_given(logged, known):
-    """SYS_HAS_MAG 0."""
-    log = known({"SYS_HAS_MAG": 0})
-    assert log.ledger["magnetometer"].left_out == {"SYS_HAS_MAG is 0": len(logged.field_us)}
-    assert log.known["use_magnetometer"] == Known(False, "log", "SYS_HAS_MAG")
+@pytest.mark.parametrize(("name", "value"), [("SYS_HAS_MAG", 0), ("EKF2_MAG_TYPE", 5)])
+def test_magnetometer_that_px4_does_not_use_is_not_given(logged, known, name, value):
+    """There is none, or EKF2 is set to ignore it."""
+    log = known({name: value})
+    assert log.ledger["magnetometer"].left_out == {f"{name} is {value}": len(logged.field_us)}
+    assert log.known["use_magnetometer"] == Known(False, "log", name)
+    assert "magnetometer" in known({"SYS_HAS_MAG": 1, "EKF2_MAG_TYPE": 0}).instruments
 
 
 def test_airspeed_that_nobody_measured_is_not_used(logged, known):
@@ -135,6 +137,16 @@ def test_airspeed_that_nobody_measured_is_not_used(logged, known):
     n = sum(i % 4 < 2 for i in range(len(logged.air_us)))
     assert log.ledger["airspeed"].left_out == {"not measured: from ground speed and wind": n}
     assert log.ledger["airspeed"].used == len(logged.air_us) - n
+
+
+def test_airspeed_without_confidence_is_not_used(logged, known):
+    """0 is a sensor that failed; a log in which it is always 0 does not fill it in."""
+    topics = {"airspeed": "uint64_t timestamp;float indicated_airspeed_m_s;float true_airspeed_m_s;float confidence;"}
+    sick = logged.air_us[20:60]
+    log = known(change=lambda m: m if m[1] != "airspeed" else (*m[:3], (*m[3], float(m[0] not in sick))), topics=topics)
+    assert log.ledger["airspeed"].left_out == {"unhealthy": 40}
+    log = known(change=lambda m: m if m[1] != "airspeed" else (*m[:3], (*m[3], 0.0)), topics=topics)
+    assert log.ledger["airspeed"].left_out == {}
 
 
 def test_vertical_velocity_without_a_number_is_not_reported(known):

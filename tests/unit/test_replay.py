@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate
-from estimator.premerlani import Premerlani, PremerlaniParams
 from scenarios.harness import logs
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.logs.recorded import RecordedLog, Reference
+from scenarios.harness.plugins import equipped
 from scenarios.harness.registry import find
 from scenarios.harness.replay import Window, as_flight, at_rest, flying, judged_rows, make, replay, score, why_none
 from sim import recording
@@ -28,8 +28,8 @@ class Called:
 
     heading_reference = "course"
 
-    def __init__(self, gps_filter_s, gps_latency_s):
-        self._dcm = Premerlani(PremerlaniParams(gps_filter_s=gps_filter_s, gps_latency_s=gps_latency_s))
+    def __init__(self, instruments):
+        self._dcm = equipped("premerlani", instruments).code
         self.reset = self._dcm.reset
 
     def update(self, m):

@@ -11,7 +11,7 @@ from scenarios.harness.logs.ledger import Ledger
 
 NO_NUMBER = "without a number"
 ZEROS = "zeros before the first reading"
-REPEATED = "time repeated"
+REPEATED = "repeated time"
 NO_TIME = "without a time"
 IN_ONE_ROW = "another arrived in the same row"
 AFTER = "after the last inertial sample"

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from estimator.instruments import Known
+from scenarios.harness.logs.ardupilot_matlab import MatlabMessages
 from scenarios.harness.logs.dataflash_records import DataFlash, Records
 from sim.magnetic_field import FIRST_YEAR, declination_rad
 
@@ -47,7 +48,7 @@ class Parameters:
     vehicle: str = ""
 
     @classmethod
-    def of(cls, log: DataFlash) -> "Parameters":
+    def of(cls, log: DataFlash | MatlabMessages) -> "Parameters":
         """Those of a log."""
         changes = log.records("PARM")
         if not {"Name", "Value"} <= set(changes.columns):
@@ -129,7 +130,7 @@ def year_of(fixes: Records) -> float:
     return _EPOCH + _WEEK_YEARS * float(np.median(weeks)) if len(weeks) else float("nan")
 
 
-def _first_flight(log: DataFlash) -> int:
+def _first_flight(log: DataFlash | MatlabMessages) -> int:
     """Where in the file the first fix of something that flies is; the end where there is none."""
     fixes = log.records("GPS")
     if not {"Status", "Spd"} <= set(fixes.columns):
@@ -138,7 +139,7 @@ def _first_flight(log: DataFlash) -> int:
     return int(fixes.offsets[np.argmax(flying)]) if flying.any() else 1 << 62
 
 
-def _vehicle(log: DataFlash) -> str:
+def _vehicle(log: DataFlash | MatlabMessages) -> str:
     """The name of the firmware, as it announces itself."""
     messages = log.records("MSG")
     if "Message" not in messages.columns:

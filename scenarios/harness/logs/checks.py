@@ -1,9 +1,9 @@
-"""What may be wrong in a log, whatever its format: mended and counted, or refused with the row and the column.
+"""What may be wrong in a log, whatever its format: mended and counted, or rejected with the row and the column.
 
 Mended: rows without a number in time, gyro or accelerometer, and rows of zeros before the first reading, are left
 out, GPS fixes, magnetic and air samples without a number too; rows late by up to a second are sorted,
 repeated times left out; times in milli-, micro- or nanoseconds, rates in degrees and forces in g are converted.
-Told: gaps.  Refused: a column without a number, a clock that runs back, more rows bad than good, an accelerometer
+Reported: gaps.  Rejected: a column without a number, a clock that runs back, more rows bad than good, an accelerometer
 with the opposite sign, whatever is no inertial unit's at all.
 
 Units are judged by what cannot be otherwise.  See `rate_factor` for the gyro.
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from estimator.interface import Array
 from estimator.screening import G_M_S2, GYRO_RANGE_RAD_S, LONGEST_GAP_S
 from scenarios.harness.logs import accounts, gaps
+from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED, ZEROS
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.witnesses import witnesses
@@ -31,7 +32,6 @@ FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in an
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
 _PERIODS = (2.0**16, 86400.0, 604800.0, 86400.0e3, 604800.0e3, 2.0**32)  # of counters, days and weeks in s and ms
 _DEGREES = 180.0 / np.pi
-NO_NUMBER, AGAIN, ZEROS = accounts.NO_NUMBER, accounts.REPEATED, accounts.ZEROS
 _ARRIVALS = (
     ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s"), "gps"),
     ("mag_new", "magnetic samples", ("mag_b_ut",), "magnetometer"),
@@ -145,7 +145,7 @@ def kept(
     if len(again):
         first_row = source.row(int(keep[again[0]]))
         repairs.append(f"{source.column('time')}: {len(again)} repeated, left out; first {first_row}")
-        ledger.leave_out("imu", len(again), AGAIN)
+        ledger.leave_out("imu", len(again), REPEATED)
         keep = np.delete(keep, again)
     return keep
 
@@ -174,16 +174,17 @@ def mended(log: RecordedLog, path: Path) -> RecordedLog:
         rows = moved
         if reference is not None:
             reference = replace(reference, R_eb=reference.R_eb[keep])
-    found = judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs), ledger=Ledger()), source)
-    found = replace(found, ledger=log.ledger)
+    found = judged(replace(log, rows=rows, reference=reference, repairs=tuple(repairs)), source)
     accounts.arrivals(log.ledger, log.rows, found.rows)
     if log.reference is not None and reference is not None:
         accounts.reference(log.ledger, log.reference.known, int(reference.known.sum()))
     return found
 
 
-def judged(log: RecordedLog, source: Source) -> RecordedLog:
-    """`log`, whose rows are in order, with intervals where it has none and units as they must be; its gaps told.
+def judged(log: RecordedLog, source: Source, ledger: Ledger | None = None) -> RecordedLog:
+    """`log`, whose rows are in order, with intervals where it has none and units as they must be; gaps are reported.
+
+    ledger : where samples that arrived without a number are counted, by default nowhere
 
     Raises
     ------
@@ -191,7 +192,7 @@ def judged(log: RecordedLog, source: Source) -> RecordedLog:
     """
     rows, repairs = log.rows.copy(), list(log.repairs)
     _fill_intervals(rows, source, repairs)
-    _check_arrivals(rows, repairs, log.ledger)
+    _check_arrivals(rows, repairs, Ledger() if ledger is None else ledger)
     _check_force(rows, source, repairs)
     factor = rate_factor(rows, log.reference)
     if factor != 1.0:

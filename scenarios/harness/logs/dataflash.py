@@ -14,6 +14,7 @@ from estimator.interface import Array
 from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import streams, tabular
 from scenarios.harness.logs.ardupilot import FIX_3D, Parameters, year_of
+from scenarios.harness.logs.ardupilot_matlab import MatlabMessages
 from scenarios.harness.logs.dataflash_records import Clock, DataFlash, Records, own_time_s
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from scenarios.harness.logs.streams import IN_GAP, NO_FIX, UNHEALTHY, Kind, Stream
@@ -37,11 +38,11 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     ------
     LogError      one line: no such log, no inertial unit in it, or one that cannot be believed
     """
-    return made(DataFlash(path), imu)
+    return of_messages(DataFlash(path), imu)
 
 
-def made(records: DataFlash, imu: int | None = None) -> RecordedLog:
-    """The log that the records make, whatever file they are from; `imu` and LogError as for `read`."""
+def of_messages(records: DataFlash | MatlabMessages, imu: int | None = None) -> RecordedLog:
+    """The log that these messages make; parameters and errors as `read`."""
     log = _Log(records)
     inertial = log.inertial(imu)
     fixes, receiver = log.fixes()
@@ -50,7 +51,7 @@ def made(records: DataFlash, imu: int | None = None) -> RecordedLog:
     height = log.stream("BARO", ("Alt",), HEALTHY[2])
     attitude = log.attitude()
     if log.others:
-        log.repairs.append(f"of several instances one is read: {'; '.join(log.others)}")
+        log.repairs.append(f"only one of several instances is read: {'; '.join(log.others)}")
     messages = streams.Messages(
         inertial,
         np.full(len(inertial.t_s), np.nan),
@@ -64,13 +65,13 @@ def made(records: DataFlash, imu: int | None = None) -> RecordedLog:
         {**receiver, **compass, **pitot},
         log.parameters.log_imu(),
     )
-    return streams.recorded(records.path, messages, log.repairs)
+    return streams.recorded(log.path, messages, log.repairs)
 
 
 class _Log:
     """The streams of a log.  `others` lists what was read of several instances."""
 
-    def __init__(self, records: DataFlash) -> None:
+    def __init__(self, records: DataFlash | MatlabMessages) -> None:
         self.of, self.path, self.repairs = records, records.path, records.repairs
         self.parameters = Parameters.of(records)
         self.others = list[str]()
@@ -89,7 +90,7 @@ class _Log:
         """Note that the others are not read."""
         if len(instances) > 1:
             listed = ", ".join(str(r.instance) for r in instances)
-            self.others.append(f"{instances[0].name} {chosen.instance} of {listed}")
+            self.others.append(f"{instances[0].name} {chosen.instance} (of {listed})")
         return chosen
 
     def made(self, records: Records, columns: tuple[str, ...]) -> Stream:
@@ -99,7 +100,7 @@ class _Log:
         if t_s is not None and self.clock.agrees(records, t_s):
             return _at_times(stream, t_s)
         t_s, in_gap = self.clock.by_order(records)
-        self.repairs.append(f"{records.name}: no time by the clock of the log; placed by the order of the records")
+        self.repairs.append(f"{records.name}: not on the clock of the log; placed by the order of the records")
         return _at_times(stream, t_s).without(np.isnan(t_s), streams.OUTSIDE).without(in_gap, IN_GAP)
 
     def stream(self, name: str, columns: tuple[str, ...], healthy: tuple[str, ...] = ()) -> Stream | None:
@@ -207,7 +208,7 @@ class _Log:
             return stream.without(np.ones(len(stream.t_s), np.bool_), off), {
                 "use_airspeed": Known(False, "log", off.partition(" ")[0])
             }
-        return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"not in use by {records.name}.U"), {}
+        return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"{records.name}.U is 0: not in use"), {}
 
     def attitude(self) -> tuple[Stream | None, Kind]:
         """The attitude: the simulator's where there is one, else what was flown on, else that of the other filter."""

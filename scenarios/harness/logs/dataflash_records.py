@@ -8,6 +8,7 @@ header follows it.  What the characters of a format mean comes from pymavlink.
 
 import struct
 from collections import defaultdict
+from collections.abc import Callable, Container
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -165,15 +166,8 @@ class DataFlash:
         return Records(name, 0, np.ascontiguousarray(block).view(self._formats[kind].dtype)[:, 0], offsets)
 
     def instances(self, name: str) -> list[Records]:
-        """The instances of a message, told apart by its column I, or by a number behind its name; the lowest first."""
-        every = self.records(name)
-        if "I" in every.columns:
-            which, counts = np.unique(every.fields["I"], return_counts=True)
-            which = which[counts >= FEWEST * counts.max()]
-            return [replace(every.where(every.fields["I"] == i), instance=int(i)) for i in which]
-        names = [(0, name), (0, f"{name}1"), *((i - 1, f"{name}{i}") for i in range(2, 10))]
-        found = [replace(self.records(own), instance=i) for i, own in names if own in self._types]
-        return [r for r in found if not (r.name == f"{name}1" and name in self._types)]
+        """The instances of a message; see the function of that name."""
+        return instances(name, self.records, self._types)
 
     def column(self, records: Records, column: str) -> Array:
         """One column in our units (angles in degrees), shape (n,)."""
@@ -192,6 +186,22 @@ class DataFlash:
     def names(self) -> list[str]:
         """Of the messages that are there."""
         return sorted(self._types)
+
+
+def instances(name: str, records: Callable[[str], Records], there: Container[str]) -> list[Records]:
+    """The instances of a message, distinguished by its column I, or by a number behind its name; the lowest first.
+
+    records : all records of a name      there : names of messages that are in the log
+    """
+    every = records(name)
+    if "I" in every.columns:
+        which, counts = np.unique(every.fields["I"], return_counts=True)
+        which = which[counts >= FEWEST * counts.max()]
+        return [replace(every.where(every.fields["I"] == i), instance=int(i)) for i in which]
+    names = [(0, name), (0, f"{name}1"), (0, f"{name}_0"), *((i - 1, f"{name}{i}") for i in range(2, 10))]
+    names += [(i, f"{name}_{i}") for i in range(1, 9)]  # as files made from a log spell them
+    found = [replace(records(own), instance=i) for i, own in names if own in there]
+    return [r for k, r in enumerate(found) if r.instance not in [other.instance for other in found[:k]]]
 
 
 def own_time_s(records: Records) -> Array | None:

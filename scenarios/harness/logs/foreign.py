@@ -5,7 +5,7 @@ from pathlib import Path
 
 from scenarios.harness.logs.recorded import LogError
 
-ENOUGH = 64  # bytes to tell a kind by
+ENOUGH = 1 << 16  # bytes to tell a kind by
 ULOG = b"ULog\x01\x12\x35"
 DATAFLASH = b"\xa3\x95"
 _ULOG, _DATAFLASH = "a ULog file of PX4: name it .ulg", "an ArduPilot DataFlash log: name it .bin"
@@ -15,15 +15,14 @@ _SDLOG2 = (
 )
 _BEGINNINGS = (
     (ULOG, _ULOG),
-    (DATAFLASH, _DATAFLASH),
     (b"FMT, ", "an ArduPilot log as text (.log): replay the .bin that it was converted from"),
     (b"PK\x03\x04", "a zip archive: unpack it first"),
     (b"\x1f\x8b", "packed with gzip: unpack it first"),
     (b"7z\xbc\xaf", "a 7z archive: unpack it first"),
     (b"PAR1", "a Parquet file: name it .parquet"),
     (b"MATLAB 5.0", "a MATLAB file: name it .mat"),
-    (b"<", "a web page, not a log: the download went wrong"),
 )
+_PAGE, _PAGES = "a web page, not a log: the download went wrong", (b"<!doctype", b"<html")
 _TELEMETRY = (
     "a MAVLink telemetry log (.tlog), which holds what was sent by radio, a few messages a second: "
     "download the log from the autopilot (.bin or .ulg)"
@@ -35,6 +34,10 @@ _OF_SDLOG2 = {"TIME": ("StartTime",), "SENS": ("BaroPres",), "ATSP": ("RollSP",)
 
 def hint(raw: bytes) -> str:
     """What the file that begins with `raw` is, and what to do with it; empty where it is nothing known."""
+    if raw.startswith(DATAFLASH):
+        return _SDLOG2 if b"StartTime" in raw[:ENOUGH] else _DATAFLASH
+    if raw[:ENOUGH].lstrip().lower().startswith(_PAGES):
+        return _PAGE
     for beginning, what in _BEGINNINGS:
         if raw.startswith(beginning):
             return what

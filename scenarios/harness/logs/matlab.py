@@ -1,7 +1,7 @@
 """MATLAB files (up to version 7.2): vectors and matrices, in structures or at the top, by a map or by their names.
 
 A column of a matrix is named ``name[0]``, or ``name.Label`` where an array ``name_label`` beside it holds the labels.
-Files with the messages of an ArduPilot log are read as such by `ardupilot_matlab`.
+Files with the messages of an ArduPilot log are read as such, see `ardupilot_matlab`.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.io import loadmat  # type: ignore[import-untyped]
 
 from estimator.interface import Array
-from scenarios.harness.logs import ardupilot_matlab, tabular
+from scenarios.harness.logs import ardupilot_matlab, dataflash, tabular
 from scenarios.harness.logs.checks import Source
 from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
 from scenarios.harness.logs.column_names import automatic
@@ -29,10 +29,8 @@ _OBJECTS = (
 )
 
 
-def read(path: Path, columns: ColumnMap | None = None, imu: int | None = None) -> RecordedLog:
+def read(path: Path, columns: ColumnMap | None = None) -> RecordedLog:
     """The log at `path`; without `columns`, by the map that comes with the package and fits, or by its names.
-
-    imu : which inertial unit of an autopilot's messages, from 0; by default the first one
 
     Raises
     ------
@@ -40,9 +38,7 @@ def read(path: Path, columns: ColumnMap | None = None, imu: int | None = None) -
     """
     content = _content(path)
     if columns is None and (messages := ardupilot_matlab.messages(path, _tables(content), content)):
-        return ardupilot_matlab.read(messages, imu)
-    if imu is not None:
-        raise LogError(f"{path}: an inertial unit is chosen among the messages of an autopilot, and these are none")
+        return dataflash.of_messages(messages)
     if columns is None:
         columns = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), None)
     found, columns = _columns(path, content, columns or ColumnMap())

@@ -7,7 +7,7 @@ flew, in a log without flight every one.
 |-|-|
 | EKF2_DECL_TYPE bit 0 | declination from the world magnetic model at the first fix, else EKF2_MAG_DECL, degrees |
 | EKF2_GPS_DELAY | latency of a fix, ms, where it carries no time at which it was true |
-| SYS_HAS_MAG | 0: no magnetometer is used |
+| SYS_HAS_MAG, EKF2_MAG_TYPE | 0, 5: no magnetometer is used |
 | SYS_HAS_NUM_ASPD, FW_USE_AIRSPD, FW_ARSP_MODE, CBRK_AIRSPD_CHK | 0, 0, 1 or 2, 162128: no airspeed is used |
 """
 
@@ -15,14 +15,14 @@ import math
 from collections.abc import Iterable, Mapping
 
 from estimator.instruments import Known
-from scenarios.harness.logs.ardupilot import world_model
+from scenarios.harness.logs.ardupilot import LONGEST_DELAY_MS, world_model
 
 _FROM_MODEL = 1  # bit of EKF2_DECL_TYPE
 _BREAKER = 162128  # a circuit breaker set to its own number is open
 _NO_AIRSPEED: Mapping[str, tuple[int, ...]] = {
     "SYS_HAS_NUM_ASPD": (0,), "FW_USE_AIRSPD": (0,), "FW_ARSP_MODE": (1, 2), "CBRK_AIRSPD_CHK": (_BREAKER,),
 }  # fmt: skip
-_NO_COMPASS: Mapping[str, tuple[int, ...]] = {"SYS_HAS_MAG": (0,)}
+_NO_COMPASS: Mapping[str, tuple[int, ...]] = {"SYS_HAS_MAG": (0,), "EKF2_MAG_TYPE": (5,)}
 LOG_FASTER = "set bit 1 (estimator replay) of SDLOG_PROFILE"
 
 
@@ -43,7 +43,8 @@ def off(values: Mapping[str, float], what: str) -> str:
 def latency(values: Mapping[str, float]) -> Known | None:
     """How late a fix is."""
     delay_ms = values.get("EKF2_GPS_DELAY", math.nan)
-    return Known(1e-3 * float(delay_ms), "log", "EKF2_GPS_DELAY") if delay_ms >= 0.0 else None
+    believed = 0.0 <= delay_ms <= LONGEST_DELAY_MS
+    return Known(1e-3 * float(delay_ms), "log", "EKF2_GPS_DELAY") if believed else None
 
 
 def declination(values: Mapping[str, float], place: tuple[float, float, float] | None, year: float) -> Known | None:
@@ -54,6 +55,6 @@ def declination(values: Mapping[str, float], place: tuple[float, float, float] |
     kind, set_deg = values.get("EKF2_DECL_TYPE"), values.get("EKF2_MAG_DECL")
     if kind is not None and int(kind) & _FROM_MODEL and place is not None:
         return world_model(place, year, f"EKF2_DECL_TYPE is {int(kind)}")
-    if set_deg is None:
+    if set_deg is None or not abs(set_deg) <= 180.0:
         return None
     return Known(math.radians(float(set_deg)), "log", "EKF2_MAG_DECL")

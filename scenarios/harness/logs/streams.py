@@ -19,7 +19,8 @@ from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
 from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import checks, gaps, tabular
-from scenarios.harness.logs.checks import AGAIN, NO_NUMBER
+from scenarios.harness.logs.accounts import NO_FIX as NO_FIX
+from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 
@@ -27,10 +28,11 @@ Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
 SLOWEST_S = 0.1  # an inertial unit logged more slowly is not to be integrated
 LOST_S, LOST_REPORTS = 2.0, 3.0  # a fix no longer holds after this silence, or so many usual intervals, if longer
 CLIMB_M = 5.0  # a receiver whose height changed by more than this, at no vertical velocity, does not report one
+FEW = 0.01  # a share of the fixes below this is damage
 FAR = "at a time far from its neighbours"
 OUTSIDE, IN_GAP = "outside the inertial record", "in a gap of the inertial record"
 REPLACED = "replaced by a later one in the same row"
-NO_FIX, UNHEALTHY = "no fix of three dimensions", "unhealthy"
+UNHEALTHY = "unhealthy"
 NO_ATTITUDE, NO_ROW, ALONE = "no attitude", "no inertial sample beside it", "no other attitude within 0.5 s"
 _BY_NAME = ("gyro.x", "gyro.y", "gyro.z", "force.x", "force.y", "force.z")
 _HAS = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
@@ -113,7 +115,7 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
     log = RecordedLog(
         rows, path.name, instruments, reference, tuple(repairs), place, {**known, **messages.known}, books.ledger
     )
-    log = checks.judged(log, source)
+    log = checks.judged(log, source, books.ledger)
     for stream, new in _HAS.items():
         if stream in log.ledger:
             log.ledger.use(stream, int(np.sum(log.rows[new] > 0)))
@@ -268,10 +270,11 @@ def _put_fixes(ticks: _Ticks, fixes: Stream | None, known: dict[str, Known]) -> 
     if len(at_s) > 2:
         known["gps_rate_hz"] = Known(1.0 / float(np.median(np.diff(at_s))), "log", fixes.name)
     known["gps_stamped"] = Known(bool(np.isfinite(rows["gps_t_s"][new]).mean() > 0.5), "log", fixes.name)
-    if np.any(rows["gps_v_e_m_s"][new, 2] != 0.0):
+    if np.mean(rows["gps_v_e_m_s"][new, 2] != 0.0) > FEW:
         known["gps_vertical_velocity"] = Known(True, "log", fixes.name)
     elif np.ptp(rows["gps_p_e_m"][new, 2]) > CLIMB_M:
         known["gps_vertical_velocity"] = Known(False, "log", fixes.name)
+        rows["gps_v_e_m_s"][:, 2] = 0.0
     return float(origin[0]), float(origin[1])
 
 
@@ -300,7 +303,7 @@ def _reference(
     books.leave_out("reference", good, ~(np.isfinite(stream.t_s) & np.isfinite(stream.values).all(axis=1)), NO_ATTITUDE)
     books.leave_out_far("reference", good, stream)
     times, first = np.unique(stream.t_s[good], return_index=True)
-    books.ledger.leave_out("reference", int(good.sum()) - len(times), AGAIN)
+    books.ledger.leave_out("reference", int(good.sum()) - len(times), REPEATED)
     R_eb = tabular.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
     known = np.isfinite(R_eb).all(axis=(1, 2))
     used = np.zeros(len(times), np.bool_)

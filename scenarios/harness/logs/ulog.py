@@ -23,7 +23,7 @@ from estimator.interface import Array
 from scenarios.harness.logs import foreign, px4, streams, tabular
 from scenarios.harness.logs.ardupilot import FLYING_M_S
 from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import NO_FIX, Kind, Stream
+from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Kind, Stream
 from scenarios.harness.logs.ulog_bytes import whole
 
 ATTITUDES: tuple[tuple[str, Kind], ...] = (
@@ -59,7 +59,7 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     height = _height(log)
     attitude = _attitude(log)
     if log.others:
-        repairs.append(f"of several instances one is read: {'; '.join(log.others)}")
+        repairs.append(f"only one of several instances is read: {'; '.join(log.others)}")
     messages = streams.Messages(
         inertial, dt_s, names, fixes, field, airspeed, height, *attitude,
         {**receiver, **compass, **pitot}, px4.LOG_FASTER,
@@ -124,7 +124,7 @@ class _Log:
     def one(self, name: str, chosen: int) -> int:
         """Note that the other instances of the topic are not read."""
         if len(there := self.instances(name)) > 1:
-            self.others.append(f"{name} {chosen} of {', '.join(map(str, there))}")
+            self.others.append(f"{name} {chosen} (of {', '.join(map(str, there))})")
         return chosen
 
     def columns(self, name: str, topic: Topic, *fields: str) -> Array:
@@ -282,7 +282,8 @@ def _airspeed(log: _Log) -> Stream | None:
         true = np.where(np.isfinite(true), true, log.columns(name, topic, "indicated_airspeed_m_s"))
     stream = Stream.of(name, _published_s(topic), true)
     if name != "airspeed_validated":
-        return stream
+        confidence = topic.get("confidence", np.zeros(0))
+        return stream.without(confidence == 0.0, UNHEALTHY) if np.any(confidence) else stream  # all 0: not filled in
     for source, first in (
         ("airspeed_source", 1),
         ("selected_airspeed_index", 1),
