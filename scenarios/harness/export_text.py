@@ -61,7 +61,8 @@ def _gps(rows: Any, *, stamped: bool) -> list[Column]:
     if stamped and np.isfinite(rows["gps_t_s"][new]).any():
         found.append(Column("gps_t_s", "gps.time s", _where(new, rows["gps_t_s"])))
     found += _vector("gps_{}_m", "gps.{} m", _where(new, rows["gps_p_e_m"]), "ned")
-    found += _vector("gps_v{}_m_s", "gps.v{} m/s", _where(new, rows["gps_v_e_m_s"]), "ned")
+    reported = "ned" if np.any(rows["gps_v_e_m_s"][new, 2] != 0.0) else "ne"  # 0 in every fix is none
+    found += _vector("gps_v{}_m_s", "gps.v{} m/s", _where(new, rows["gps_v_e_m_s"]), reported)
     found.append(Column("gps_speed_m_s", "gps.speed m/s", _where(new, rows["gps_speed_m_s"])))
     found.append(Column("gps_course_rad", "gps.course rad", _where(new, rows["gps_course_rad"])))
     return found

@@ -97,13 +97,13 @@ def test_load_reads_the_form_of_a_file_and_what_its_attitude_is(tmp_path):
 
 @pytest.mark.parametrize("table", ["instruments", "suits"])
 def test_load_instruments_are_properties_or_parameters_of_an_estimator(tmp_path, table):
-    """Numbers and truth values; `gps_gain` is a parameter of ap_dcm alone; [suits] is the older name."""
-    text = f"[{table}]\ngps_latency_s = 0.2\ngps_stamped = true\ngps_gain = 0\n"
+    """Numbers and truth values; `fly_forward` is a parameter of ap_dcm alone; [suits] is the older name."""
+    text = f"[{table}]\ngps_latency_s = 0.2\ngps_stamped = true\nfly_forward = 0\n"
     known = load(written(tmp_path, text)).known
     assert known == {
         "gps_latency_s": Known(0.2, "log", "own.toml"),
         "gps_stamped": Known(True, "log", "own.toml"),
-        "gps_gain": Known(0, "log", "own.toml"),
+        "fly_forward": Known(0, "log", "own.toml"),
     }
 
 
@@ -125,7 +125,7 @@ def test_load_instruments_are_properties_or_parameters_of_an_estimator(tmp_path,
         ('[columns]\na = { unit = "deg/s" }', r"write \{ is = "),
         ('[columns]\n[suits]\ngps_latency_s = "b"', r"\[suits\] gps_latency_s = 'b' must be a number, true or false"),
         ("[instruments]\ngps_lateny_s = 1", r"gps_lateny_s: no such property: did you mean gps_latency_s"),
-        ("[instruments]\ngps_gian = 1", r"gps_gian: no such property: did you mean gps_gain"),
+        ("[instruments]\nfly_foward = 1", r"fly_foward: no such property: did you mean fly_forward\?$"),
         ("[instruments]\ngps_latency_s = inf", "gps_latency_s = inf must be a number"),
         ('delimiter = ",,"\n[columns]', "delimiter = ',,' must be one character"),
         ('decimal = ";"', "decimal = ';' must be"),

@@ -73,12 +73,13 @@ def test_stamps_in_the_unit_of_the_time_are_converted_with_it(held, read):
 
 
 def test_vertical_velocity_is_known_where_it_is_reported(held, read):
-    """A column of zeros is none."""
+    """A column of zeros is none where the height changes by more than 5 m."""
     at, vn, ve = fixes(held.n)
-    for down, expected in ((0.25, True), (0.0, False)):
-        vd = np.full(held.n, np.nan)
-        vd[at] = down
-        log = read({"vn": vn, "ve": ve, "vd": vd})
+    assert read({"vn": vn, "ve": ve}).known["gps_vertical_velocity"].value is False
+    for down, height_m, expected in ((0.25, 0.0, True), (0.0, 0.0, True), (0.0, 20.0, False)):
+        vd, gps_d = np.full(held.n, np.nan), np.full(held.n, np.nan)
+        vd[at], gps_d[at] = down, np.linspace(0.0, -height_m, len(at))
+        log = read({"vn": vn, "ve": ve, "vd": vd, "gps_d": gps_d})
         assert log.known["gps_vertical_velocity"].value is expected
         np.testing.assert_array_equal(log.rows["gps_v_e_m_s"][at, 2], down)
 

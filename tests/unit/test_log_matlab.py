@@ -77,7 +77,7 @@ def test_messages_of_ardupilot_become_the_rows_of_the_flight(tmp_path, matrices,
     savemat(tmp_path / "log.mat", form(matrices))
     log = logs.read(tmp_path / "log.mat")
     expected = logged.expected()
-    expected["gps_t_s"] = np.where(expected["gps_valid"] > 0, np.nan, 0.0)
+    expected["gps_t_s"][expected["gps_valid"] > 0] = np.nan
     expected["gps_valid"][logged.t_us >= matrices["GPS"][-1, 1]] = 0
     demand_same_rows(log.rows, expected, {"gps_p_e_m": 1e-5})
     assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
@@ -230,3 +230,13 @@ def test_columns_without_a_clock_are_refused(tmp_path, held):
     savemat(tmp_path / "log.mat", content)
     with pytest.raises(LogError, match=r"gps \(12 rows: gps\.vn, gps\.ve\) has no time: name a column"):
         logs.read(tmp_path / "log.mat")
+
+
+def test_second_unit_of_the_messages_is_chosen(tmp_path, matrices, logged):
+    """As of the autopilot's own logs; columns that are no messages have no second unit."""
+    savemat(tmp_path / "log.mat", as_cells(matrices))
+    rows = logs.read(tmp_path / "log.mat", imu=1).rows
+    np.testing.assert_allclose(rows["gyro_b_rad_s"], logged.rate + 0.3, rtol=0, atol=1e-12)
+    savemat(tmp_path / "plain.mat", {"t": logged.t_us / 1e6, "gyro": logged.rate, "acc": logged.force})
+    with pytest.raises(LogError, match="is chosen among the messages of an autopilot, and these are none"):
+        logs.read(tmp_path / "plain.mat", imu=1)

@@ -72,8 +72,10 @@ def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) ->
     by_map, autopilot = (_module(name, endings) for endings in (_BY_MAP, _OF_AUTOPILOTS))
     if meanings is not None and not by_map:
         raise LogError(f"{path}: a column map is for text and MATLAB files")
-    if imu is not None and not autopilot:
-        raise LogError(f"{path}: an inertial unit is chosen in logs of autopilots (.bin, .ulg)")
+    if imu is not None and not autopilot and by_map != "matlab":
+        raise LogError(f"{path}: an inertial unit is chosen in logs of autopilots (.bin, .ulg, their .mat)")
+    if by_map == "matlab":
+        return import_module(f"{__name__}.{by_map}").read(path, meanings, imu)
     if by_map:
         return import_module(f"{__name__}.{by_map}").read(path, meanings)
     if autopilot:

@@ -274,7 +274,7 @@ def _known(data: Mapping[str, Any], path: Path) -> dict[str, Known]:
             raise LogError(f"{path}: {table} must be a table: [{table}]")
         for name, value in entries.items():
             if name not in PROPERTIES and name not in _parameters():
-                possible = [*PROPERTIES, *_parameters()]
+                possible = {*PROPERTIES, *_parameters()}
                 raise LogError(f"{path}: [{table}] {name}: no such property: {near_misses(name, possible)}")
             if not isinstance(value, int | float) or not math.isfinite(value):
                 raise LogError(f"{path}: [{table}] {name} = {value!r} must be a number, true or false")

@@ -29,8 +29,10 @@ _OBJECTS = (
 )
 
 
-def read(path: Path, columns: ColumnMap | None = None) -> RecordedLog:
+def read(path: Path, columns: ColumnMap | None = None, imu: int | None = None) -> RecordedLog:
     """The log at `path`; without `columns`, by the map that comes with the package and fits, or by its names.
+
+    imu : which inertial unit of an autopilot's messages, from 0; by default the first one
 
     Raises
     ------
@@ -38,7 +40,9 @@ def read(path: Path, columns: ColumnMap | None = None) -> RecordedLog:
     """
     content = _content(path)
     if columns is None and (messages := ardupilot_matlab.messages(path, _tables(content), content)):
-        return dataflash.of_messages(messages)
+        return dataflash.of_messages(messages, imu)
+    if imu is not None:
+        raise LogError(f"{path}: an inertial unit is chosen among the messages of an autopilot, and these are none")
     if columns is None:
         columns = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), None)
     found, columns = _columns(path, content, columns or ColumnMap())

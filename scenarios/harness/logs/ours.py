@@ -34,7 +34,7 @@ def read(path: Path) -> RecordedLog:
     instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
     reference = Reference(flight.log.truth["R_eb"], "truth", "the true attitude")
     name = path.name if path.is_dir() else path.parent.name
-    known = {**_measured(rows), **known_of(flight)}
+    known = known_of(flight) if "known" in flight.manifest else _measured(rows)  # in replay what was known in flight
     return RecordedLog(rows, name or path.name, instruments, reference, (), place_of(flight), known)
 
 
@@ -53,7 +53,7 @@ def place_of(flight: Flight) -> tuple[float, float]:
 
 
 def _measured(rows: NDArray[Any]) -> dict[str, Known]:
-    """What the rows say of the instruments, where the manifest does not: as of any other log."""
+    """What the rows of a recording without a record of its instruments say of them: as of any other log."""
     known = properties.measured(rows)
     fixes = rows[rows["gps_new"] > 0]
     if len(fixes):

@@ -27,6 +27,7 @@ from scenarios.harness.logs.units import COUNTS
 from scenarios.harness.logs.validity import usable
 
 Table = dict[str, Array]
+CLIMB_M = 5.0  # a receiver whose height changes by more than this, at no vertical velocity, does not report one
 FEWEST_FORCES = 5  # samples of the gyro for one of the accelerometer, at most
 REMEDY = (
     "where the axes are forward, left, up: --columns forward-left-up; right, forward, up: --columns right-forward-up; "
@@ -336,8 +337,19 @@ def _take_fixes(made: _Making, group: Group) -> None:
     stamps = _held(found.values[:, 8], last, np.nan)
     stamped = fixes.on_this_clock(stamps[new], rows["t_s"][new], made.repairs)
     rows["gps_t_s"] = np.where(last >= 0, stamps, 0.0) if stamped else np.nan
+    made.known["gps_vertical_velocity"] = _reports_vertical(table, rows)
     rows["gps_valid"] = _valid(table, t_s, found.lost, new, rows["t_s"])
     made.known["gps_stamped"] = Known(stamped, "log", "stamps of the fixes" if stamped else "no stamps of fixes")
+
+
+def _reports_vertical(table: Table, rows: NDArray[Any]) -> Known:
+    """Whether the receiver reports a vertical velocity: one that is 0 while the height changes is none."""
+    if "gps.vd" not in table:
+        return Known(False, "log", "no column of it")
+    fixes = rows[rows["gps_new"] > 0]
+    climbs = np.ptp(fixes["gps_p_e_m"][:, 2]) > CLIMB_M
+    reports = bool(np.any(fixes["gps_v_e_m_s"][:, 2] != 0.0) or not climbs)
+    return Known(reports, "log", "its column" if reports else "its column is 0 while the height changes")
 
 
 def _valid(
