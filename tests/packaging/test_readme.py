@@ -91,7 +91,7 @@ def test_view_command_of_the_readme_is_understood(here: Path, capsys, monkeypatc
 
 def test_export_commands_of_the_documents_write_what_they_name(here: Path) -> None:
     """They take the newest flight, or the one that they name; a text log replays with its map."""
-    run(["fly", "hand_launch", "--duration", "2", "--no-rerun"])
+    run(["fly", "hand_launch", "--duration", "20", "--no-rerun"])  # long enough for a replay to judge
     for command in (c for c in commands() if c.startswith("wingslevel export")):
         assert run(shlex.split(command)[1:]) == 0
     assert {"fixes.nmea", "fixes.ubx", "flight.csv", "flight.toml"} <= {path.name for path in here.iterdir()}

@@ -59,7 +59,7 @@ def reasons(table: Mapping[str, Array], R_eb: Array) -> tuple[NDArray[np.bool_],
 
 
 def mend_angles(table: Table) -> bool:
-    """Make angles whose unit nobody said radians, where they exceed what radians can be; whether they did."""
+    """Convert angles without a given unit from degrees where they exceed what radians can be; whether they did."""
     if not all(name in table for name in EULER):
         return False
     roll, pitch, yaw = (np.nanmax(np.abs(table[name]), initial=0.0) for name in EULER)

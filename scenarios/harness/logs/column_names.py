@@ -83,11 +83,11 @@ _SCALARS: tuple[tuple[frozenset[str], str], ...] = tuple(
 )  # fmt: skip
 
 
-_UNTOLD = 20  # added to the rank of a clock that does not tell its unit
+_UNTOLD = 20  # added to the rank of a clock whose unit is not given
 
 
 class Heard(NamedTuple):
-    """What a name may mean: the quantity, a factor to our unit, whether the name tells the unit, and words left over.
+    """What a name may mean: the quantity, a factor to our unit, whether the name gives the unit, and words left over.
 
     stem : the name without its axis: columns of one vector share it
     """
@@ -145,7 +145,7 @@ def meanings(header: str, unit: str = "") -> list[Heard]:
             factor = units.factor_of(spelled, _dimension(quantity)) if spelled else 1.0
             if factor is not None:
                 told = bool(spelled) or sign not in (1.0, -1.0)
-                worse = 0 if told or quantity != "time" else _UNTOLD  # of two clocks the one that tells its unit
+                worse = 0 if told or quantity != "time" else _UNTOLD  # of two clocks the one whose unit is given
                 found[quantity] = Heard(quantity, sign * factor, told, rank + worse, stem)
     return sorted(found.values(), key=lambda heard: heard.rank)
 

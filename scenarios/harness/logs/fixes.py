@@ -37,7 +37,7 @@ def reports(
 ) -> Reports | None:
     """The reports in the rows of `table`, which are in order of time; None without any column of them.
 
-    told : quantities whose unit somebody said: the others are judged by their values
+    told : quantities whose unit is given: the others are judged by their values
     each : every row is a report, none is held: the receiver has times of its own
     """
     names = [name for name in table if name.startswith("gps.") and name not in _FLAGS]
@@ -80,7 +80,7 @@ def _read(table: Mapping[str, Array], columns: Array) -> NDArray[np.bool_]:
 
 
 def _velocity(table: Mapping[str, Array], told: frozenset[str]) -> Array | None:
-    """North, east, down, speed over ground and course, shape (n, 5); a vertical velocity that is not told is 0."""
+    """North, east, down, speed over ground and course, shape (n, 5); without a vertical velocity it is 0."""
     speed, course = table.get("gps.speed"), table.get("gps.course")
     if course is not None and "gps.course" not in told and np.nanmax(np.abs(course), initial=0.0) > 2.0 * np.pi + 0.01:
         course = course / _DEGREES

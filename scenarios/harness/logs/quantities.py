@@ -12,7 +12,7 @@ class Quantity(NamedTuple):
 class Meaning(NamedTuple):
     """What one column holds: the `quantity`, and value = factor * (number in the file - offset), in our unit.
 
-    told : whether somebody said the unit, else it may be judged by the values
+    told : whether the unit is given; else it may be judged by the values
     """
 
     quantity: str

@@ -40,7 +40,7 @@ REMEDY = (
 class Group:
     """Columns of one length with times in common, by our names and in our units.
 
-    told : quantities whose unit somebody said      own : its clock is not that of the inertial unit: no value is held
+    told : quantities whose unit is given      own : its clock is not that of the inertial unit: no value is held
     """
 
     table: Table
@@ -279,7 +279,7 @@ def interpolated(t_s: Array, times: Array, values: Array) -> Array:
 
 
 def _intervals(main: Group, keep: NDArray[np.intp], repairs: list[str]) -> Array:
-    """Intervals that the file tells, NaN where it does not or they cannot be those between its rows."""
+    """Intervals that the file holds; NaN where there are none, or where they cannot be those between its rows."""
     if not main.has("interval"):
         return np.full(len(keep), np.nan)
     said = main.table["interval"][keep]

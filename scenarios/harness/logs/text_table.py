@@ -1,4 +1,4 @@
-"""Text files of numbers in columns, as loggers and spreadsheets write them: found out, not asked for.
+"""Text files of numbers in columns, as loggers and spreadsheets write them; their form is detected.
 
 Recognised: packed files (.gz), UTF-8 with and without a byte-order mark, UTF-16, Latin-1; line ends of any system;
 commas, semicolons, tabs, bars, or blanks between the cells; decimal commas; remarks (# % //), among them a header
