@@ -114,10 +114,18 @@ def to_map(found: list[Column], flight: Flight, name: str) -> str:
         *(f'{column.name} = "{column.meaning}"' for column in found),
     ]
     given = {n: k.value for n, k in known.items() if k.source in KNOWN_BY and isinstance(k.value, bool | int | float)}
+    calibration = {n: k.value for n, k in ours.calibration_of(flight).items()}
+    given |= calibration
     if given:
         lines += ["", "[instruments]", *(f"{n} = {_toml(value)}" for n, value in given.items())]
+    if (sample := ours.on_ground_of(flight)) is not None:
+        lines += ["", "[on_ground]  # mean inertial sample before the flight, at rest", f"seconds = {sample.dt_s!r}"]
+        lines += [f"{n} = {getattr(sample, n).tolist()}" for n in ("gyro_b_rad_s", "force_b_m_s2")]
     return "\n".join(lines) + "\n"
 
 
-def _toml(value: bool | int | float) -> str:
+def _toml(value: Any) -> str:
+    """A value as TOML spells it."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
     return str(value).lower() if isinstance(value, bool) else repr(value)

@@ -29,6 +29,7 @@ from sim.loop import Watch, fly
 from sim.plant import HandThrow, InFlight, Plant, Start
 from sim.power_up import sample_at_rest
 from sim.prescribed_plant import PrescribedPlant, Rest
+from sim.recording import plain
 from sim.sensors.suite import Suite
 
 
@@ -70,7 +71,8 @@ def fly_config(
     """Fly `scenario` under `config`, drawing what it leaves to chance.
 
     The resolved configuration is the manifest's ``config``: ``fly_config(scenario, FlightConfig(**that))`` flies
-    the same flight again.  Its ``known`` is what is known of the instruments, its ``known_to_estimator`` what of that
+    the same flight again.  Its ``on_ground`` is the mean inertial sample from before a flight that starts in the air,
+    where there is one, its ``known`` what is known of the instruments, its ``known_to_estimator`` what of that
     the estimator was given, or has learnt.
     """
     config = resolve(config) if maker is not None else with_calibration(resolve(config))
@@ -81,6 +83,7 @@ def fly_config(
     faults = [parse_fault(fault) for fault in config.faults]
     sensors = suite_params(config.suite, config.sensors, config.files)
     airborne = isinstance(config.start, InFlightStart)
+    on_ground = sample_at_rest(sensors, rates, config.seed, config.flight) if airborne else None
     flown = fly(
         plant,
         Suite(sensors, rates, config.seed, config.flight, faults, plant.release_s),
@@ -89,13 +92,14 @@ def fly_config(
         script,
         Log.empty(rates.ticks(plant.release_s + config.duration_s)),
         calibration_s=config.calibration_s,
-        on_ground=sample_at_rest(sensors, rates, config.seed, config.flight) if airborne else None,
+        on_ground=on_ground,
         manifest={
             "scenario": scenario.name,
             "seed": config.seed,
             "config": config.model_dump(mode="json"),
             "known": to_json(instruments_of(config)),
-        },
+        }
+        | ({} if on_ground is None else {"on_ground": plain(on_ground._asdict())}),
         watch=watch,
     )
     events = (*flown.events, *events_of_faults(faults, flown), *scenario.events(flown))

@@ -193,7 +193,10 @@ def _equipped(
 
 def _places(params: Any, names: Iterable[str]) -> dict[str, str]:
     """Those of `names` that are fields of `params` or of a group in it, with their dotted names."""
-    return {name: path for path in dotted_fields(params) if (name := path.rpartition(".")[2]) in set(names)}
+    paths, wanted = dotted_fields(params), set(names)
+    return {path.rpartition(".")[2]: path for path in paths if path.rpartition(".")[2] in wanted} | {
+        path: path for path in paths if path in wanted
+    }
 
 
 def _with_params(kind: _Kind, spec: "str | Maker", code: Any, changes: Mapping[str, Any], also: dict[str, Any]) -> Any:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.instruments import Instruments, Known, to_json
+from estimator.instruments import PROPERTIES, Instruments, Known, to_json
 from estimator.interface import Array, AttitudeEstimator, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
 from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
@@ -132,17 +132,22 @@ def replay(
     """Run the estimator `spec` over `log` and score it.
 
     params : by name; what the log says of its instruments (`RecordedLog.known`) holds where they do not
-    withheld : names of properties of the instruments that it is not given, whatever the log says
+    withheld : names of properties of the instruments that it is not given, whatever the log says; where these are all
+        of them, no calibration from before the log either
 
     Raises
     ------
     ValueError      one line: no such estimator or parameter, or a calibration longer than the log
     """
     window = window or Window()
-    estimator, known = make(spec, params or {}, Instruments(log.known, withheld=withheld))
+    unknown = set(withheld) >= set(PROPERTIES)  # nor is it given what was measured before the log
+    of_log = {name: entry for name, entry in log.known.items() if not (unknown and name.startswith("calibration."))}
+    estimator, known = make(spec, params or {}, Instruments(of_log, withheld=withheld))
     n = _calibration(log, window)
     on_ground = at_rest(log.rows[:n]) if n else None
     first = n if on_ground is not None else 0
+    if n and on_ground is None and not unknown:
+        on_ground = log.on_ground
     flown = Log.empty(len(log.rows))
     _truth_of(log, flown.truth)
     flown.measured[:] = log.rows

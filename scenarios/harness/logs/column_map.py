@@ -37,7 +37,7 @@ from typing import Any, Literal, cast
 import numpy as np
 
 from estimator.instruments import PROPERTIES, Known
-from estimator.interface import Array
+from estimator.interface import Array, ImuSample
 from scenarios.harness.logs import column_names, units
 from scenarios.harness.logs.quantities import QUANTITIES, Meaning
 from scenarios.harness.logs.recorded import LogError
@@ -47,12 +47,15 @@ from scenarios.harness.plugins import near_misses
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
 Kind = Literal["truth", "filter", "firmware"]
 _KEYS = ("columns", "delimiter", "decimal", "skip_lines", "names", "struct", "axes", "force_reversed", "reference",
-         "origin_deg", "instruments", "suits", "withheld")  # fmt: skip
+         "origin_deg", "instruments", "suits", "withheld", "on_ground")  # fmt: skip
 _ENTRIES = ("is", "unit", "factor", "offset")
 _DIRECTIONS = {  # of a sensor axis -> its unit vector in the body: forward, right, down
     "forward": (1, 0, 0), "back": (-1, 0, 0), "right": (0, 1, 0), "left": (0, -1, 0), "down": (0, 0, 1),
     "up": (0, 0, -1),
 }  # fmt: skip
+
+
+_OLDER_NAMES = {"use_compass": "use_magnetometer"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,7 @@ class ColumnMap:
     columns : empty where they are to be recognised       delimiter : empty where it is to be found
     R_bs : shape (3, 3), from the axes of the sensors to the body, None where they are the same
     rivals : quantity -> columns that are named for it equally well      origin_deg : latitude and longitude
+    on_ground : mean inertial sample at rest from before the log
     """
 
     columns: Mapping[str, Meaning] = field(default_factory=dict)
@@ -77,6 +81,7 @@ class ColumnMap:
     reference: Kind = "filter"
     origin_deg: tuple[float, float] | None = None
     rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    on_ground: ImuSample | None = None
 
     def of(self, header: Iterable[str], row_of_units: Mapping[str, str] | None = None) -> "ColumnMap":
         """The same map, with the columns of `header` that are recognised where it names none."""
@@ -129,7 +134,26 @@ def load(spec: str | Path) -> ColumnMap:
         force_reversed=_flag(data, path),
         reference=_kind(data, path),
         origin_deg=_origin(data, path),
+        on_ground=_on_ground(data, path),
     )
+
+
+def _on_ground(data: Mapping[str, Any], path: Path) -> ImuSample | None:
+    """The mean inertial sample of the table [on_ground]: seconds averaged, rad/s, m/s^2."""
+    table = data.get("on_ground")
+    if table is None:
+        return None
+    wanted = {"seconds": 1, "gyro_b_rad_s": 3, "force_b_m_s2": 3}
+    right = "[on_ground] must have seconds, gyro_b_rad_s and force_b_m_s2: a number, and three numbers each"
+    if not isinstance(table, dict) or set(table) != set(wanted):
+        raise LogError(f"{path}: {right}")
+    try:
+        values = {name: np.array(table[name], np.float64) for name in wanted}
+    except (TypeError, ValueError):
+        raise LogError(f"{path}: {right}") from None
+    if any(v.size != wanted[n] or not np.isfinite(v).all() for n, v in values.items()):
+        raise LogError(f"{path}: {right}")
+    return ImuSample(0.0, float(values["seconds"]), values["gyro_b_rad_s"], values["force_b_m_s2"])
 
 
 def _meaning(entry: Any, where: str) -> Meaning:
@@ -272,11 +296,16 @@ def _known(data: Mapping[str, Any], path: Path) -> dict[str, Known]:
         entries = data.get(table, {})
         if not isinstance(entries, dict):
             raise LogError(f"{path}: {table} must be a table: [{table}]")
-        for name, value in entries.items():
+        for spelled, value in entries.items():
+            name = str(_OLDER_NAMES.get(spelled, spelled))
+            if name == "calibration":  # dotted keys make a table of it
+                found |= {f"calibration.{n}": Known(v, "log", path.name) for n, v in dict(value).items()}
+                continue
             if name not in PROPERTIES and name not in _parameters():
                 possible = {*PROPERTIES, *_parameters()}
                 raise LogError(f"{path}: [{table}] {name}: no such property: {near_misses(name, possible)}")
-            if not isinstance(value, int | float) or not math.isfinite(value):
+            endless = name.endswith(("full_scale_rad_s", "full_scale_m_s2")) and value == math.inf
+            if not isinstance(value, int | float) or not (math.isfinite(value) or endless):
                 raise LogError(f"{path}: [{table}] {name} = {value!r} must be a number, true or false")
             found[name] = Known(value, "log", path.name)
     withheld = data.get("withheld", [])

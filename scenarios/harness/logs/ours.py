@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.instruments import Known
+from estimator.interface import ImuSample
 from scenarios.harness.logs import properties
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from sim import recording
@@ -35,13 +36,31 @@ def read(path: Path) -> RecordedLog:
     reference = Reference(flight.log.truth["R_eb"], "truth", "the true attitude")
     name = path.name if path.is_dir() else path.parent.name
     known = known_of(flight) if "known" in flight.manifest else _measured(rows)  # in replay what was known in flight
-    return RecordedLog(rows, name or path.name, instruments, reference, (), place_of(flight), known)
+    known |= calibration_of(flight)
+    return RecordedLog(
+        rows, name or path.name, instruments, reference, (), place_of(flight), known, on_ground=on_ground_of(flight)
+    )
 
 
 def known_of(flight: Flight) -> dict[str, Known]:
     """What the manifest of a flight says of the instruments aboard."""
     known = flight.manifest.get("known", {})
-    return {name: Known(entry["value"], entry["source"]) for name, entry in known.items()}
+    return {name: Known.from_json(entry) for name, entry in known.items()}
+
+
+def calibration_of(flight: Flight) -> dict[str, Known]:
+    """The calibration of the magnetometer that an estimator was given, by the names of its parameters."""
+    given = flight.manifest.get("config", {}).get("estimator_params", {})
+    return {n: Known(v, "log", "calibration in flight") for n, v in given.items() if n.startswith("calibration.")}
+
+
+def on_ground_of(flight: Flight) -> ImuSample | None:
+    """The mean inertial sample at rest from before a flight that starts in the air, where there is one."""
+    sample = flight.manifest.get("on_ground")
+    if sample is None:
+        return None
+    gyro, force = (np.array(sample[name], np.float64) for name in ("gyro_b_rad_s", "force_b_m_s2"))
+    return ImuSample(sample["t_s"], sample["dt_s"], gyro, force)
 
 
 def place_of(flight: Flight) -> tuple[float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.instruments import Known
-from estimator.interface import Array
+from estimator.interface import Array, ImuSample
 from scenarios.harness.logs.ledger import Ledger
 
 
@@ -46,6 +46,7 @@ class RecordedLog:
             parameters that single estimators have
     ledger : what became of everything that the file holds
     notes : what else is worth saying of it, a line each
+    on_ground : mean inertial sample at rest from before the log, where it begins in the air and holds one
     """
 
     rows: NDArray[Any]
@@ -57,3 +58,4 @@ class RecordedLog:
     known: Mapping[str, Known] = field(default_factory=dict)
     ledger: Ledger = field(default_factory=Ledger)
     notes: tuple[str, ...] = ()
+    on_ground: ImuSample | None = None

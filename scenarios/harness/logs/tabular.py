@@ -206,7 +206,8 @@ def recorded(
     instruments = ("gyro", "accelerometer", *(name for name, there in has.items() if there))
     place = meanings.origin_deg or made.place
     log = RecordedLog(
-        rows, source.path.name, instruments, reference, tuple(repairs), place, known, made.ledger
+        rows, source.path.name, instruments, reference, tuple(repairs), place, known, made.ledger,
+        on_ground=meanings.on_ground,
     )  # fmt: skip
     return checks.judged(log, source)
 
