@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.instruments import Known
+from estimator.instruments import PROPERTIES, Known
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate
 from scenarios.harness import logs
 from scenarios.harness.flight import fly_scenario
@@ -20,7 +20,7 @@ from sim import recording
 from sim.log import Outcome
 
 DATA = Path(__file__).parents[1] / "reference" / "data"
-HAND, AIR = "hand_launch", "turns_180"
+HAND, AIR, RESTED = "hand_launch", "turns_180", "turns_180 on apm2, which rested before"
 
 
 class Called:
@@ -47,9 +47,9 @@ class Broken:
 def flights(tmp_path_factory):
     """A short hand launch and a short flight that starts in the air: as flown, and read from their recordings."""
     found = {}
-    for name in (HAND, AIR):
-        flight = fly_scenario(find(name), {"duration_s": 12.0}, seed=2)
-        folder = recording.save(flight, tmp_path_factory.mktemp(name) / "flight")
+    for name, changes in ((HAND, {}), (AIR, {}), (RESTED, {"suite": "apm2"})):
+        flight = fly_scenario(find(name.split()[0]), {"duration_s": 12.0, **changes}, seed=2)
+        folder = recording.save(flight, tmp_path_factory.mktemp(name.split()[0]) / "flight")
         found[name] = flight, logs.read(folder)
     return found
 
@@ -63,9 +63,9 @@ def rest(n=200):
     return rows
 
 
-@pytest.mark.parametrize("name", [HAND, AIR])
+@pytest.mark.parametrize("name", [HAND, AIR, RESTED])
 def test_replay_of_a_flight_is_what_was_flown_bit_for_bit(flights, name):
-    """The estimator believes of the recording what it believed aboard, calibration in the hand included."""
+    """The estimate is that of the flight, calibration in the hand or on the ground before it included."""
     flight, log = flights[name]
     replayed = replay(log, "premerlani")
     assert replayed.first == (100 if name == HAND else 0)
@@ -74,6 +74,17 @@ def test_replay_of_a_flight_is_what_was_flown_bit_for_bit(flights, name):
         np.testing.assert_array_equal(got[replayed.first :], flown[replayed.first :])
     assert replayed.rejected == 0
     assert replayed.ns_per_update > 0.0
+    assert (log.on_ground is None) is (name != RESTED)
+
+
+def test_replay_with_everything_withheld_knows_no_calibration_either(flights):
+    """The offset of apm2's gyros, measured before the flight, is then unknown: its error is there to be seen."""
+    flight, log = flights[RESTED]
+    replayed = replay(log, "premerlani", withheld=list(PROPERTIES))
+    assert replayed.known["gps_filter_s"][:2] == (0.0, "withheld")
+    offset_deg_s = np.degrees(np.abs(flight.log.truth["gyro_bias_b_rad_s"][0]).max())
+    assert offset_deg_s > 5.0
+    assert replayed.scores["inclination_max_deg"] > 5.0 * replay(log, "premerlani").scores["inclination_max_deg"]
 
 
 def test_replay_called_row_by_row_is_the_same(flights):
