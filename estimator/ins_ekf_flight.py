@@ -9,9 +9,11 @@ import numpy as np
 
 from estimator.ins_ekf_kernels import (
     BIAS,
+    DOWN,
     FORCE,
     GAIN,
     LAG,
+    LATENCY,
     TILT,
     VEL,
     WIND_NE,
@@ -42,7 +44,11 @@ START_TILT_RAD, RESTART_TILT_RAD = math.radians(15.0), 0.7
 STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the start
 FRAME_RAD = 0.01  # sigma of the heading before a match: none, in a frame of its own
 MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
-CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR = 1, 2, 4, 8, 16  # bits of a waiting sample
+DOWN_UNKNOWN_M = 100.0  # sigma of a height before the first
+HEIGHT_LIFE_S = 5.0  # without a height for longer, the next one starts anew
+INCIDENCE_M_S = 2.0  # sigma of the velocity through the air along the body's z axis, where no height is reported
+STANDING_M_S = 1.0  # a fix of exactly zero velocity may be held by the receiver: sigma
+CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR, HAS_BARO, STAMPED = 1, 2, 4, 8, 16, 32, 64  # bits of a waiting sample
 
 
 # How it starts
@@ -69,6 +75,9 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     forget(s.P, VEL, 3, np.hypot(speed_sigma_m_s, STEADY_M_S))
     for i in range(3):  # a receiver in steady motion holds the velocity there is
         s.P[VEL + i, LAG + i] = s.P[LAG + i, VEL + i] = speed_sigma_m_s**2
+    if not s.gps_vertical_velocity:
+        forget(s.P, DOWN, 1, DOWN_UNKNOWN_M)
+    forget(s.P, LATENCY, 1, s.gps_latency_sigma_s)
     length = max(np.hypot(s.R_filter_eb[0, 0], s.R_filter_eb[1, 0]), 1e-3)
     s.nose_at_start[0], s.nose_at_start[1] = s.R_filter_eb[0, 0] / length, s.R_filter_eb[1, 0] / length
     forget(s.P, WIND_NE, 2, s.wind_sigma_m_s)
@@ -77,6 +86,7 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     s.seeded = s.aligned = 0
     s.cruise_m_s, s.cruise_sigma_m_s = 0.0, 10.0
     s.refusing_s = 0.0
+    s.height_age_s = math.inf
 
 
 @kernel
@@ -122,6 +132,8 @@ def turn_heading(s, angle_rad):  # type: ignore[no-untyped-def]
     c, z = np.cos(angle_rad), np.sin(angle_rad)
     for v in (s.v_e_m_s, s.lagged_v_e_m_s, s.lagged_rate_m_s2, s.wind_e_m_s):
         v[0], v[1] = c * v[0] - z * v[1], z * v[0] + c * v[1]
+    n = s.nose_at_start
+    n[0], n[1] = c * n[0] - z * n[1], z * n[0] + c * n[1]
     turn_pairs(s.P, c, z)
     transpose(s.P)
     turn_pairs(s.P, c, z)
@@ -170,6 +182,7 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
     z, early = s.w_fix_v_e_m_s[i], s.w_fix_early_s[i]
     for j in range(3):  # to the end of the sample
         z[j] += early * s.lagged_rate_m_s2[j]
+    stamped = (s.w_bits[i] & STAMPED) != 0
     speed = np.hypot(z[0], z[1])
     fast = speed >= s.min_speed_m_s
     if not s.seeded:
@@ -188,21 +201,42 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
         turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
         doubt_heading(s, MATCH_RAD)
         s.aligned = 1
-    believed = 0
-    for j in range(3):
+    believed, reported = 0, 3 if s.gps_vertical_velocity else 2
+    for j in range(reported):
         no_gradient(s.h)
         s.h[LAG + j] = 1.0
-        variance = s.gps_noise_m_s**2 + (s.gps_lag_sigma_s * s.lagged_rate_m_s2[j]) ** 2
+        rate = s.lagged_rate_m_s2[j]
+        variance = s.gps_noise_m_s**2 + (s.gps_lag_sigma_s * rate) ** 2
         if j < 2:
             variance += turning * turning
-        believed += fuse(s, z[j] - s.lagged_v_e_m_s[j], variance, s.gate)
-    if believed == 3:
+        innovation = z[j] - s.lagged_v_e_m_s[j]
+        if not stamped:  # true dL earlier than its place was chosen for: y(t - dL) = y - dL dy/dt
+            innovation += (s.latency_s - s.w_fix_latency_s[i]) * rate
+            if s.aligned:
+                s.h[LATENCY] = -rate
+        believed += fuse(s, innovation, variance, s.gate)
+    if believed == reported:
         s.fix_age_s = s.refusing_s = 0.0
         return
     refuse(s, GPS)
     s.refusing_s = max(s.refusing_s, 1e-9)
     if s.refusing_s > RESTART_S:
         restart(s)
+
+
+@kernel
+def take_height(s, down_m, late_s):  # type: ignore[no-untyped-def]
+    """Take in a position downward, filtered by the receiver for `late_s`; the first one starts it."""
+    if not s.height_age_s < HEIGHT_LIFE_S:
+        forget(s.P, DOWN, 1, s.height_noise_m)
+        s.lagged_v_e_m_s[2] = down_m + late_s * s.v_e_m_s[2]
+        s.height_age_s = 0.0
+        return
+    no_gradient(s.h)
+    s.h[DOWN], s.h[VEL + 2] = 1.0, -late_s
+    innovation = down_m - s.lagged_v_e_m_s[2] + late_s * s.v_e_m_s[2]
+    if fuse(s, innovation, s.height_noise_m**2, s.gate):
+        s.height_age_s = 0.0
 
 
 @kernel
@@ -216,8 +250,17 @@ def restart(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_mag(s, i):  # type: ignore[no-untyped-def]
-    """Take in the magnetic heading beside waiting sample `i`; the first one starts the heading."""
+    """Take in the magnetic heading beside waiting sample `i`; the first one starts the heading.
+
+    The iron of an aeroplane can turn a field that was never calibrated by any angle: such a field only says where
+    the frame of unknown heading points until a moving fix comes.
+    """
     innovation = wrap(s.declination_rad - magnetic_course(s, s.w_mag_b_ut[i]))
+    if not s.use_magnetometer:
+        if not s.aligned:
+            turn_heading(s, innovation)
+        s.mag_started = 1
+        return
     if not s.aligned:
         turn_heading(s, innovation)
         doubt_heading(s, MATCH_RAD)
@@ -247,6 +290,9 @@ def take_pseudo(s):  # type: ignore[no-untyped-def]
             s.cruise_sigma_m_s = SILENT_SPEED_M_S
         across = through_air(s, 1)
         fuse(s, -across, s.sideslip_sigma_m_s**2, s.gate)
+        if not s.gps_vertical_velocity and not s.height_age_s < HEIGHT_LIFE_S:
+            down = through_air(s, 2)
+            fuse(s, -down, INCIDENCE_M_S**2, s.gate)
     if silent:
         for axis in range(3):
             aim = s.cruise_m_s if axis == 0 else 0.0
@@ -267,10 +313,15 @@ def advance_filter(s):  # type: ignore[no-untyped-def]
     s.fix_age_s += dt
     s.refusing_s += dt if s.refusing_s > 0.0 else 0.0
     s.pseudo_s += dt
+    s.height_age_s += dt
     s.lift_e_m_s2 += (s.force_e[2] - s.lift_e_m_s2) * min(dt / FIX_LIFE_S, 1.0)
-    corrected = (bits & (HAS_FIX | HAS_MAG | HAS_AIR)) != 0
+    corrected = (bits & (HAS_FIX | HAS_MAG | HAS_AIR | HAS_BARO)) != 0
     if bits & HAS_FIX:
         take_fix(s, i)
+        if not s.gps_vertical_velocity and not s.has_baro and s.w_fix_down_m[i] != 0.0:
+            take_height(s, s.w_fix_down_m[i] + s.w_fix_early_s[i] * s.v_e_m_s[2], s.gps_filter_s)
+    if bits & HAS_BARO:
+        take_height(s, s.w_baro_down_m[i], 0.0)
     if bits & HAS_MAG:
         take_mag(s, i)
     if bits & HAS_AIR:

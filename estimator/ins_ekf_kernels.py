@@ -1,16 +1,20 @@
 """The Kalman filter inside `estimator.ins_ekf`: its error state, one prediction, one scalar measurement.
 
-Error state, true value less estimate, N = 20 numbers:
+Error state, true value less estimate, N = 21 numbers:
 
-======  ====  =====================================================================================
-TILT    3     small rotation in earth axes, ``R_true = Exp(tilt) R_eb``; its third is the heading
-VEL     3     velocity over the ground, earth axes
-BIAS    3     gyro bias, body axes
-GAIN    3     relative gain error of each gyro axis
-FORCE   3     accelerometer bias, body axes
-LAG     3     velocity inside the receiver, behind its first-order filter, earth axes
-WIND    2     north and east velocity of the air
-======  ====  =====================================================================================
+=======  ====  =====================================================================================
+TILT     3     small rotation in earth axes, ``R_true = Exp(tilt) R_eb``; its third is the heading
+VEL      3     velocity over the ground, earth axes
+BIAS     3     gyro bias, body axes
+GAIN     3     relative gain error of each gyro axis
+FORCE    3     accelerometer bias, body axes
+LAG      3     velocity inside the receiver, behind its first-order filter, earth axes
+WIND     2     north and east velocity of the air
+LATENCY  1     from the moment a fix is true to its arrival
+=======  ====  =====================================================================================
+
+Where the receiver reports no vertical velocity there is none inside it to follow: the third number of LAG then is
+the position downward (`DOWN`), as heights report it.
 
 An attitude error in earth axes keeps the heading, which may be quite unknown, apart from the tilt, which is not.
 
@@ -31,12 +35,14 @@ from estimator.jit import kernel
 from estimator.kernels import clip
 from estimator.screening import G_M_S2
 
-N = 20
-TILT, VEL, BIAS, GAIN, FORCE, LAG, WIND_NE = 0, 3, 6, 9, 12, 15, 18
+N = 21
+TILT, VEL, BIAS, GAIN, FORCE, LAG, WIND_NE, LATENCY = 0, 3, 6, 9, 12, 15, 18, 20
+DOWN = LAG + 2
 
 FULL = 0.97  # share of the full scale from which on a reading may be cut off
 CUT_RAD_S, CUT_M_S2, CUT_S = 1.0, 10.0, 0.1  # sigma and correlation time of what is then missing
 CROSS_S = 2.0  # how long an error that turns with the body keeps its direction: about a radian of turn
+LATENCY_WALK_S_SQRT_S = 0.001  # a latency that is learnt may change: sigma after one second
 BIAS_LIMIT = 6.0  # no bias, gain or wind is believed beyond this many initial sigmas
 
 
@@ -98,9 +104,7 @@ def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
         for j in range(3):
             s.R_filter_eb[i, j] = s.R_half[i, j]
     turn_in_body(s.R_filter_eb, x, y, z)
-    # The receiver's filter, dy/dt = (v - y) / T, solved exactly for a velocity that is linear within the sample.
-    a, end = filter_weights(s.gps_filter_s, dt)
-    s.lag_keep, s.lag_end = a, end
+    lag_weights(s, dt)
     for i in range(3):
         f = 0.0
         for j in range(3):
@@ -108,7 +112,7 @@ def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
         s.force_e[i] = f
         before = s.v_e_m_s[i]
         s.v_e_m_s[i] = before + dt * (f + G_M_S2 if i == 2 else f)
-        lagged = a * s.lagged_v_e_m_s[i] + (1.0 - a - end) * before + end * s.v_e_m_s[i]
+        lagged = s.lag_keep[i] * s.lagged_v_e_m_s[i] + s.lag_old[i] * before + s.lag_end[i] * s.v_e_m_s[i]
         s.lagged_rate_m_s2[i] = (lagged - s.lagged_v_e_m_s[i]) / dt
         s.lagged_v_e_m_s[i] = lagged
 
@@ -124,13 +128,26 @@ def filter_weights(time_constant_s, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def lag_weights(s, dt):  # type: ignore[no-untyped-def]
+    """Set what LAG keeps of itself over a sample, and takes of the velocity at its start and end.
+
+    The receiver's filter, dy/dt = (v - y) / T, solved exactly for a velocity that is linear within the sample; where
+    there is no vertical velocity in it, the integral of that velocity.
+    """
+    keep, end = filter_weights(s.gps_filter_s, dt)
+    for i in range(3):
+        s.lag_keep[i], s.lag_old[i], s.lag_end[i] = keep, 1.0 - keep - end, end
+    if not s.gps_vertical_velocity:
+        s.lag_keep[2], s.lag_old[2], s.lag_end[2] = 1.0, 0.5 * dt, 0.5 * dt
+
+
+@kernel
 def apply_transition(P, s, dt):  # type: ignore[no-untyped-def]
     """``P <- F P``, in place, with the values that `advance_state` kept (Sola 7.2, with the states added here)."""
     R, f, w = s.R_half, s.force_e, s.rate_b
-    keep, end = s.lag_keep, s.lag_end
-    old = 1.0 - keep - end
     f0, f1, f2 = dt * f[0], dt * f[1], dt * f[2]
     for i in range(3):
+        keep, old = s.lag_keep[i], s.lag_old[i]
         for j in range(N):
             P[LAG + i, j] = keep * P[LAG + i, j] + old * P[VEL + i, j]
     for j in range(N):  # d(vel)/dt = tilt x f - R force_bias
@@ -153,6 +170,7 @@ def apply_transition(P, s, dt):  # type: ignore[no-untyped-def]
             P[TILT + i, j] -= b0 * P[BIAS, j] + b1 * P[BIAS + 1, j] + b2 * P[BIAS + 2, j]
             P[TILT + i, j] -= g0 * P[GAIN, j] + g1 * P[GAIN + 1, j] + g2 * P[GAIN + 2, j]
     for i in range(3):
+        end = s.lag_end[i]
         for j in range(N):
             P[LAG + i, j] += end * P[VEL + i, j]
 
@@ -200,6 +218,9 @@ def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-de
     grow(P, VEL, 3, velocity * dt, 1e6)
     grow(P, BIAS, 3, s.gyro_walk_rad_s_sqrt_s**2 * dt, s.gyro_bias_sigma_rad_s**2)
     grow(P, WIND_NE, 2, s.wind_walk_m_s_sqrt_s**2 * dt, s.wind_sigma_m_s**2)
+    grow(P, LATENCY, 1, LATENCY_WALK_S_SQRT_S**2 * dt, s.gps_latency_sigma_s**2)
+    if not s.gps_vertical_velocity:
+        grow(P, DOWN, 1, s.height_walk_m_sqrt_s**2 * dt, 1e4)
 
 
 @kernel
@@ -266,6 +287,7 @@ def correct_state(s, innovation):  # type: ignore[no-untyped-def]
         s.force_bias_b_m_s2[i] = within(s.force_bias_b_m_s2[i] + k[FORCE + i] * innovation, s.force_bias_sigma_m_s2)
     for i in range(2):
         s.wind_e_m_s[i] = within(s.wind_e_m_s[i] + k[WIND_NE + i] * innovation, s.wind_sigma_m_s)
+    s.latency_s = clip(s.latency_s + k[LATENCY] * innovation, 0.0, s.longest_latency_s)
 
 
 @kernel
