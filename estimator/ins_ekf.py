@@ -107,6 +107,7 @@ _PARAMS = tuple(
 _FILTER = (
     Column("R_filter_eb", (3, 3), "attitude at the filter's time"),
     Column("v_e_m_s", (3,), "velocity over the ground, at the filter's time"),
+    Column("calibrated_bias_b_rad_s", (3,), "gyro bias measured at power-up"),
     Column("gyro_gain", (3,), "what the gyro reads too much, per unit of rate"),
     Column("force_bias_b_m_s2", (3,), "what the accelerometer reads too much"),
     Column("lagged_v_e_m_s", (3,), "velocity inside the receiver, behind its filter"),
@@ -134,6 +135,8 @@ _AROUND = (
     Column("height_age_s", (), "time since a height was believed; only where vertical velocity is not reported"),
     Column("has_baro", (), "1 once a barometric height came: heights by GPS are then left alone", integer=True),
     Column("mag_started", (), "1 once an uncalibrated magnetometer gave a first heading", integer=True),
+    Column("shaking_m2_s4",(),""),Column("last_force",(3,),""),Column("surprise",(),""),
+    Column("nis", (), ""),Column("inn", (), ""),Column("fnis",(3,),""),Column("finn",(3,),""),
     Column("unstamped", (), "how many fixes without a stamp came", integer=True),
     Column("pseudo_s", (), "time since the last pseudo-measurements"),
     Column("cruise_m_s", (), "airspeed of late, for when the GPS falls silent"),
@@ -347,7 +350,7 @@ class InsEkf(Compiled):
         if on_ground is None:
             start_in_air(self._state)
             return
-        s["gyro_bias_b_rad_s"] = offset_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = s["calibrated_bias_b_rad_s"] = offset_at_rest(on_ground)
         start_at_rest(self._state, np.array(on_ground.force_b_m_s2, np.float64))
 
     @property

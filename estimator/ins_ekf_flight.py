@@ -185,6 +185,12 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
     stamped = (s.w_bits[i] & STAMPED) != 0
     speed = np.hypot(z[0], z[1])
     fast = speed >= s.min_speed_m_s
+    if fast and not s.aligned and s.seeded:
+        y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
+        sigma = np.sqrt(max(s.P[LAG, LAG], s.P[LAG + 1, LAG + 1]))
+        if speed - np.hypot(y0, y1) > 1.5 + s.gate * sigma:
+            s.seeded = 0
+            s.fix_age_s = math.inf
     if not s.seeded:
         begin_with_fix(s, z, fast)
     turning = 0.0  # sigma of a horizontal velocity that has no direction yet
@@ -201,12 +207,13 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
         turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
         doubt_heading(s, MATCH_RAD)
         s.aligned = 1
+    total = 0.0
     believed, reported = 0, 3 if s.gps_vertical_velocity else 2
     for j in range(reported):
         no_gradient(s.h)
         s.h[LAG + j] = 1.0
         rate = s.lagged_rate_m_s2[j]
-        variance = s.gps_noise_m_s**2 + (s.gps_lag_sigma_s * rate) ** 2
+        variance = s.gps_noise_m_s**2 * max(1.0, s.surprise) + (s.gps_lag_sigma_s * rate) ** 2
         if j < 2:
             variance += turning * turning
         innovation = z[j] - s.lagged_v_e_m_s[j]
@@ -214,7 +221,19 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
             innovation += (s.latency_s - s.w_fix_latency_s[i]) * rate
             if s.aligned:
                 s.h[LATENCY] = -rate
+        expected = variance_of(s) + variance
+        nis = innovation * innovation / expected
+        total += min(innovation * innovation / (expected - s.gps_noise_m_s**2 * (max(1.0, s.surprise) - 1.0)), 50.0)
+        if s.x_huber > 0.0 and nis > s.x_huber**2 and nis < s.gate**2:
+            variance += (nis / s.x_huber**2 - 1.0) * expected
+        if s.x_soft > 0.0 and nis > s.gate**2 and s.refusing_s > 0.0:
+            soften(s, innovation)
+            variance += s.x_soft* innovation * innovation
         believed += fuse(s, innovation, variance, s.gate)
+        s.fnis[j] = s.nis
+        s.finn[j]=s.inn
+    if s.aligned:
+        s.surprise += s.x_adapt * (total / reported - s.surprise)
     if believed == reported:
         s.fix_age_s = s.refusing_s = 0.0
         return
@@ -222,6 +241,25 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
     s.refusing_s = max(s.refusing_s, 1e-9)
     if s.refusing_s > RESTART_S:
         restart(s)
+
+
+@kernel
+def variance_of(s):  # type: ignore[no-untyped-def]
+    v = 0.0
+    for i in range(N):
+        for j in range(N):
+            if s.h[i] != 0.0 and s.h[j] != 0.0:
+                v += s.h[i] * s.P[i, j] * s.h[j]
+    return v
+
+
+@kernel
+def soften(s, innovation):  # type: ignore[no-untyped-def]
+    e2 = innovation * innovation
+    for i in range(3):
+        s.P[VEL + i, VEL + i] += e2
+        s.P[LAG + i, LAG + i] += e2
+        s.P[TILT + i, TILT + i] += min(e2 / 100.0, 0.1)
 
 
 @kernel
@@ -349,6 +387,7 @@ def keep_sane(s):  # type: ignore[no-untyped-def]
         level(s.R_filter_eb)
     if not (whole and total < 1e9):
         for i in range(3):
-            s.gyro_bias_b_rad_s[i] = s.gyro_gain[i] = s.force_bias_b_m_s2[i] = 0.0
+            s.gyro_bias_b_rad_s[i] = s.calibrated_bias_b_rad_s[i]
+            s.gyro_gain[i] = s.force_bias_b_m_s2[i] = 0.0
         start(s, RESTART_TILT_RAD, s.wind_sigma_m_s)
         s.rejected += 1

@@ -210,6 +210,10 @@ def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-de
     # An error with variance v and correlation time t acts, over longer times, as white noise of 2 v t.
     tilt = 0.5 * s.gyro_noise_rad_s_sqrt_hz**2 + 2.0 * CROSS_S * s.gyro_cross_axis**2 * squared
     velocity = 0.5 * s.force_noise_m_s2_sqrt_hz**2
+    velocity = max(velocity, s.x_vib * s.shaking_m2_s4 * dt)
+    f = s.force_e
+    pull = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) - G_M_S2
+    velocity += 2.0 * CROSS_S * (s.x_gain * pull) ** 2
     if gyro_cut:
         tilt += 2.0 * CUT_S * CUT_RAD_S**2
     if force_cut:
@@ -226,6 +230,11 @@ def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-de
 @kernel
 def predict(s, gyro, force, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-def]
     """Advance state and covariance by one inertial sample."""
+    share = min(dt / 1.0, 1.0)
+    for i in range(3):
+        step = force[i] - s.last_force[i]
+        s.shaking_m2_s4 += (step * step / 6.0 - s.shaking_m2_s4 / 3.0) * share
+        s.last_force[i] = force[i]
     advance_state(s, gyro, force, dt)
     apply_transition(s.P, s, dt)  # F P
     transpose(s.P)  # (F P)^T = P F^T
@@ -252,6 +261,8 @@ def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
                 left[i] += P[j, i] * h[j]
     for i in range(N):
         expected += h[i] * left[i]
+    s.nis = innovation * innovation / expected
+    s.inn=innovation
     if not innovation * innovation <= gate * gate * expected:  # written so that NaN is refused
         return False
     for i in range(N):
@@ -280,9 +291,9 @@ def correct_state(s, innovation):  # type: ignore[no-untyped-def]
     for i in range(3):
         s.v_e_m_s[i] += k[VEL + i] * innovation
         s.lagged_v_e_m_s[i] += k[LAG + i] * innovation
-        s.gyro_bias_b_rad_s[i] = within(
-            s.gyro_bias_b_rad_s[i] + k[BIAS + i] * innovation, 2.0 * s.gyro_bias_sigma_rad_s
-        )
+        calibrated = s.calibrated_bias_b_rad_s[i]
+        change = s.gyro_bias_b_rad_s[i] - calibrated + k[BIAS + i] * innovation
+        s.gyro_bias_b_rad_s[i] = calibrated + within(change, 2.0 * s.gyro_bias_sigma_rad_s)
         s.gyro_gain[i] = within(s.gyro_gain[i] + k[GAIN + i] * innovation, s.gyro_gain_sigma)
         s.force_bias_b_m_s2[i] = within(s.force_bias_b_m_s2[i] + k[FORCE + i] * innovation, s.force_bias_sigma_m_s2)
     for i in range(2):

@@ -95,6 +95,11 @@ class InsEkfParams:
     magnetic_noise_rad: float = math.radians(5.0)
     min_speed_m_s: float = 3.0
     gate: float = 5.0
+    x_vib: float = 0.0
+    x_gain: float = 0.0
+    x_adapt: float = 0.0
+    x_soft: float = 0.0
+    x_huber: float = 0.0
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S
     force_range_m_s2: float = FORCE_RANGE_M_S2
 
@@ -128,6 +133,6 @@ class InsEkfParams:
 
 _MAY_BE_INFINITE = ("gyro_full_scale_rad_s", "force_full_scale_m_s2")
 _MAY_BE_ZERO = (
-    *FLOORS, "gps_filter_s", "gps_latency_s", "gps_latency_sigma_s", "gps_lag_sigma_s", "height_walk_m_sqrt_s",
+    *FLOORS, "x_vib", "x_gain", "x_adapt", "x_soft", "x_huber", "gps_filter_s", "gps_latency_s", "gps_latency_sigma_s", "gps_lag_sigma_s", "height_walk_m_sqrt_s",
     "wind_walk_m_s_sqrt_s",
 )  # fmt: skip
