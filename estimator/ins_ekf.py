@@ -49,7 +49,6 @@ from estimator.ins_ekf_flight import (
     CUT_GYRO,
     FIX_LIFE_S,
     HAS_AIR,
-    HAS_BARO,
     HAS_FIX,
     HAS_MAG,
     SIZE,
@@ -93,7 +92,6 @@ from estimator.screening import (
 LONGEST_STAMPED_S = 2.0  # a stamp further back is of another clock
 LEARNT_SHARE = 0.5  # a sigma below so much of what it was at the start means that something was learnt
 SHRINK_S = 0.005  # the horizon comes nearer by no more than this from fix to fix
-HIGHEST_M = 1e5  # no height is further from the launch point
 COAST_S = 0.25  # how long the last rate stands in for a broken gyro
 WIND_KNOWN_M_S = 1.5  # sigma, both axes together, of a wind worth telling
 GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigmas of a good attitude
@@ -120,9 +118,10 @@ _FILTER = (
     Column("R_half", (3, 3), "attitude in the middle of the last sample"),
     Column("rate_b", (3,), "rate in it"),
     Column("force_e", (3,), "specific force in it, earth axes"),
-    Column("lag_keep", (3,), "weight of the old output of the receiver's filter"),
-    Column("lag_old", (3,), "weight of its input at the start of the sample"),
-    Column("lag_end", (3,), "weight of its input at the end of the sample"),
+    Column("lag_keep", (), "weight of the old output of the receiver's filter"),
+    Column("lag_end", (), "weight of its newest input"),
+    Column("expected", (), "variance of the last innovation"),
+    Column("surprise", (), "square of a fix's innovation over its variance, mean of late"),
     Column("latency_s", (), "latency of a fix without a stamp, as far as it is learnt"),
     Column("longest_latency_s", (), "the longest that is learnt"),
 )
@@ -132,11 +131,7 @@ _AROUND = (
     Column("aligned", (), "1 once the heading was found", integer=True),
     Column("fix_age_s", (), "time since a fix was believed"),
     Column("refusing_s", (), "time since the first of the fixes refused of late, 0 where the last was believed"),
-    Column("height_age_s", (), "time since a height was believed; only where vertical velocity is not reported"),
-    Column("has_baro", (), "1 once a barometric height came: heights by GPS are then left alone", integer=True),
     Column("mag_started", (), "1 once an uncalibrated magnetometer gave a first heading", integer=True),
-    Column("shaking_m2_s4",(),""),Column("last_force",(3,),""),Column("surprise",(),""),
-    Column("nis", (), ""),Column("inn", (), ""),Column("fnis",(3,),""),Column("finn",(3,),""),
     Column("unstamped", (), "how many fixes without a stamp came", integer=True),
     Column("pseudo_s", (), "time since the last pseudo-measurements"),
     Column("cruise_m_s", (), "airspeed of late, for when the GPS falls silent"),
@@ -153,8 +148,6 @@ _AROUND = (
     Column("w_fix_v_e_m_s", (SIZE, 3), "velocity of the fix that was true in it"),
     Column("w_fix_early_s", (SIZE,), "how long before its end"),
     Column("w_fix_latency_s", (SIZE,), "latency by which that place was chosen"),
-    Column("w_fix_down_m", (SIZE,), "position downward of that fix, 0 where unknown"),
-    Column("w_baro_down_m", (SIZE,), "barometric height, downward"),
     Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
     Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
 )
@@ -216,7 +209,6 @@ def attach_fix(row, s):  # type: ignore[no-untyped-def]
     s.w_bits[i] |= bits
     s.w_fix_early_s[i] = min(max(s.w_clock_s[i] - (s.clock_s - late_s), 0.0), s.w_dt_s[i])
     s.w_fix_latency_s[i] = s.clock_s - s.w_clock_s[i] + s.w_fix_early_s[i]
-    s.w_fix_down_m[i] = row.gps_p_e_m[2] if abs(row.gps_p_e_m[2]) < HIGHEST_M else 0.0
     for j in range(3):
         s.w_fix_v_e_m_s[i, j] = v[j]
 
@@ -233,10 +225,6 @@ def attach_others(row, s):  # type: ignore[no-untyped-def]
                 s.w_mag_b_ut[i, j] = m[j]
         else:
             refuse(s, MAG)
-    if row.air_new and not s.gps_vertical_velocity and abs(row.baro_height_m) < HIGHEST_M:
-        s.w_bits[i] |= HAS_BARO
-        s.w_baro_down_m[i] = -row.baro_height_m
-        s.has_baro = 1
     if row.air_new and s.use_airspeed:
         if abs(row.airspeed_m_s) < 1000.0:  # a pitot tube at rest reads a little below zero
             s.w_bits[i] |= HAS_AIR
@@ -371,8 +359,7 @@ class InsEkf(Compiled):
         Returns
         -------
         dict    tilt_e_rad (3,), v_e_m_s (3,), gyro_bias_b_rad_s (3,), gyro_gain (3,), force_bias_b_m_s2 (3,),
-                lagged_v_e_m_s (3,) (its third is the height, m, where no vertical velocity is reported),
-                wind_e_m_s (2,), gps_latency_s (1,)
+                lagged_v_e_m_s (3,), wind_e_m_s (2,), gps_latency_s (1,)
         """
         sigmas = np.sqrt(np.diagonal(self._state["P"][0]))
         parts = {

@@ -9,7 +9,6 @@ import numpy as np
 
 from estimator.ins_ekf_kernels import (
     BIAS,
-    DOWN,
     FORCE,
     GAIN,
     LAG,
@@ -44,11 +43,9 @@ START_TILT_RAD, RESTART_TILT_RAD = math.radians(15.0), 0.7
 STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the start
 FRAME_RAD = 0.01  # sigma of the heading before a match: none, in a frame of its own
 MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
-DOWN_UNKNOWN_M = 100.0  # sigma of a height before the first
-HEIGHT_LIFE_S = 5.0  # without a height for longer, the next one starts anew
-INCIDENCE_M_S = 2.0  # sigma of the velocity through the air along the body's z axis, where no height is reported
-STANDING_M_S = 1.0  # a fix of exactly zero velocity may be held by the receiver: sigma
-CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR, HAS_BARO, STAMPED = 1, 2, 4, 8, 16, 32, 64  # bits of a waiting sample
+STANDING_M_S = 1.0  # sigma of a fix of exactly zero: receivers report that at low speed (static navigation)
+SURPRISE_SHARE, MOST_SURPRISE = 0.1, 50.0  # weight of a fix in the mean, and the most that one can count
+CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR, STAMPED = 1, 2, 4, 8, 16, 32  # bits of a waiting sample
 
 
 # How it starts
@@ -75,8 +72,6 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     forget(s.P, VEL, 3, np.hypot(speed_sigma_m_s, STEADY_M_S))
     for i in range(3):  # a receiver in steady motion holds the velocity there is
         s.P[VEL + i, LAG + i] = s.P[LAG + i, VEL + i] = speed_sigma_m_s**2
-    if not s.gps_vertical_velocity:
-        forget(s.P, DOWN, 1, DOWN_UNKNOWN_M)
     forget(s.P, LATENCY, 1, s.gps_latency_sigma_s)
     length = max(np.hypot(s.R_filter_eb[0, 0], s.R_filter_eb[1, 0]), 1e-3)
     s.nose_at_start[0], s.nose_at_start[1] = s.R_filter_eb[0, 0] / length, s.R_filter_eb[1, 0] / length
@@ -86,7 +81,7 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     s.seeded = s.aligned = 0
     s.cruise_m_s, s.cruise_sigma_m_s = 0.0, 10.0
     s.refusing_s = 0.0
-    s.height_age_s = math.inf
+    s.surprise = 1.0
 
 
 @kernel
@@ -177,64 +172,53 @@ def begin_with_fix(s, z, fast):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def find_heading(s, z, speed):  # type: ignore[no-untyped-def]
+    """Turn the estimate so that the velocity believed to be inside the receiver is that of the fix `z`, shape (3,).
+
+    Returns
+    -------
+    bool    False where that velocity is not known well enough, or too slow: the fix cannot be used
+    """
+    y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
+    if s.P[LAG, LAG] + s.P[LAG + 1, LAG + 1] > max(speed, s.wind_sigma_m_s * 1.5) ** 2:
+        s.seeded = 0  # drifted too far to be matched: begin again with the next fix
+        s.fix_age_s = math.inf
+        return False
+    if np.hypot(y0, y1) < 0.5 * s.min_speed_m_s:
+        return False  # moving, and not yet known to be
+    turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
+    doubt_heading(s, MATCH_RAD)
+    s.aligned = 1
+    return True
+
+
+@kernel
+def was_never_at_rest(s, speed):  # type: ignore[no-untyped-def]
+    """Whether a fix is too fast for a start at rest: the flight did not begin where the gyros were calibrated."""
+    sigma = np.sqrt(max(s.P[LAG, LAG], s.P[LAG + 1, LAG + 1]))
+    return speed - np.hypot(s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]) > 0.5 * s.min_speed_m_s + s.gate * sigma
+
+
+@kernel
 def take_fix(s, i):  # type: ignore[no-untyped-def]
     """Take in the fix beside waiting sample `i`; the filter is at the end of that sample."""
     z, early = s.w_fix_v_e_m_s[i], s.w_fix_early_s[i]
+    unsure = STANDING_M_S if z[0] == 0.0 and z[1] == 0.0 else 0.0  # sigma beside the receiver's noise
     for j in range(3):  # to the end of the sample
         z[j] += early * s.lagged_rate_m_s2[j]
-    stamped = (s.w_bits[i] & STAMPED) != 0
     speed = np.hypot(z[0], z[1])
     fast = speed >= s.min_speed_m_s
-    if fast and not s.aligned and s.seeded:
-        y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
-        sigma = np.sqrt(max(s.P[LAG, LAG], s.P[LAG + 1, LAG + 1]))
-        if speed - np.hypot(y0, y1) > 1.5 + s.gate * sigma:
-            s.seeded = 0
-            s.fix_age_s = math.inf
+    if fast and s.seeded and not s.aligned and was_never_at_rest(s, speed):
+        s.seeded = 0
+        s.fix_age_s = math.inf
     if not s.seeded:
         begin_with_fix(s, z, fast)
-    turning = 0.0  # sigma of a horizontal velocity that has no direction yet
-    if not s.aligned and not fast:
-        turning = speed
-    elif not s.aligned:
-        y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
-        if s.P[LAG, LAG] + s.P[LAG + 1, LAG + 1] > max(speed, s.wind_sigma_m_s * 1.5) ** 2:
-            s.seeded = 0  # drifted too far to be matched: begin again with the next fix
-            s.fix_age_s = math.inf
+    if not s.aligned:
+        if not fast:
+            unsure = max(speed, unsure)  # a horizontal velocity has no direction yet
+        elif not find_heading(s, z, speed):
             return
-        if np.hypot(y0, y1) < 0.5 * s.min_speed_m_s:
-            return  # moving, and not yet known to be
-        turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
-        doubt_heading(s, MATCH_RAD)
-        s.aligned = 1
-    total = 0.0
-    believed, reported = 0, 3 if s.gps_vertical_velocity else 2
-    for j in range(reported):
-        no_gradient(s.h)
-        s.h[LAG + j] = 1.0
-        rate = s.lagged_rate_m_s2[j]
-        variance = s.gps_noise_m_s**2 * max(1.0, s.surprise) + (s.gps_lag_sigma_s * rate) ** 2
-        if j < 2:
-            variance += turning * turning
-        innovation = z[j] - s.lagged_v_e_m_s[j]
-        if not stamped:  # true dL earlier than its place was chosen for: y(t - dL) = y - dL dy/dt
-            innovation += (s.latency_s - s.w_fix_latency_s[i]) * rate
-            if s.aligned:
-                s.h[LATENCY] = -rate
-        expected = variance_of(s) + variance
-        nis = innovation * innovation / expected
-        total += min(innovation * innovation / (expected - s.gps_noise_m_s**2 * (max(1.0, s.surprise) - 1.0)), 50.0)
-        if s.x_huber > 0.0 and nis > s.x_huber**2 and nis < s.gate**2:
-            variance += (nis / s.x_huber**2 - 1.0) * expected
-        if s.x_soft > 0.0 and nis > s.gate**2 and s.refusing_s > 0.0:
-            soften(s, innovation)
-            variance += s.x_soft* innovation * innovation
-        believed += fuse(s, innovation, variance, s.gate)
-        s.fnis[j] = s.nis
-        s.finn[j]=s.inn
-    if s.aligned:
-        s.surprise += s.x_adapt * (total / reported - s.surprise)
-    if believed == reported:
+    if believe_velocity(s, i, z, unsure):
         s.fix_age_s = s.refusing_s = 0.0
         return
     refuse(s, GPS)
@@ -244,37 +228,35 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def variance_of(s):  # type: ignore[no-untyped-def]
-    v = 0.0
-    for i in range(N):
-        for j in range(N):
-            if s.h[i] != 0.0 and s.h[j] != 0.0:
-                v += s.h[i] * s.P[i, j] * s.h[j]
-    return v
+def believe_velocity(s, i, z, unsure):  # type: ignore[no-untyped-def]
+    """Fuse the velocity `z`, shape (3,), of the fix beside waiting sample `i`; whether all of it was believed.
 
+    unsure : further sigma of the horizontal components, m/s
 
-@kernel
-def soften(s, innovation):  # type: ignore[no-untyped-def]
-    e2 = innovation * innovation
-    for i in range(3):
-        s.P[VEL + i, VEL + i] += e2
-        s.P[LAG + i, LAG + i] += e2
-        s.P[TILT + i, TILT + i] += min(e2 / 100.0, 0.1)
-
-
-@kernel
-def take_height(s, down_m, late_s):  # type: ignore[no-untyped-def]
-    """Take in a position downward, filtered by the receiver for `late_s`; the first one starts it."""
-    if not s.height_age_s < HEIGHT_LIFE_S:
-        forget(s.P, DOWN, 1, s.height_noise_m)
-        s.lagged_v_e_m_s[2] = down_m + late_s * s.v_e_m_s[2]
-        s.height_age_s = 0.0
-        return
-    no_gradient(s.h)
-    s.h[DOWN], s.h[VEL + 2] = 1.0, -late_s
-    innovation = down_m - s.lagged_v_e_m_s[2] + late_s * s.v_e_m_s[2]
-    if fuse(s, innovation, s.height_noise_m**2, s.gate):
-        s.height_age_s = 0.0
+    Where innovations are larger than they should be, the noise of the receiver is taken for larger in proportion: it
+    is that of another receiver, or the aeroplane shakes its sensors more than data sheets know.
+    """
+    stamped = (s.w_bits[i] & STAMPED) != 0
+    components = 3 if s.gps_vertical_velocity else 2
+    noise = s.gps_noise_m_s**2
+    more = noise * (max(1.0, s.surprise) - 1.0)
+    believed, surprise = 0, 0.0
+    for j in range(components):
+        rate = s.lagged_rate_m_s2[j]
+        no_gradient(s.h)
+        s.h[LAG + j] = 1.0
+        innovation = z[j] - s.lagged_v_e_m_s[j]
+        if not stamped:  # a latency longer by dL: the fix was true earlier, y(t - dL) = y - dL dy/dt
+            innovation += (s.latency_s - s.w_fix_latency_s[i]) * rate
+            s.h[LATENCY] = -rate if s.aligned else 0.0
+        variance = noise + more + (s.gps_lag_sigma_s * rate) ** 2
+        if j < 2:
+            variance += unsure * unsure
+        believed += fuse(s, innovation, variance, s.gate)
+        surprise += min(innovation * innovation / (s.expected - more), MOST_SURPRISE)
+    if s.aligned:
+        s.surprise += SURPRISE_SHARE * (surprise / components - s.surprise)
+    return believed == components
 
 
 @kernel
@@ -319,7 +301,7 @@ def take_airspeed(s, i):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_pseudo(s):  # type: ignore[no-untyped-def]
-    """No sideslip in flight; without GPS, no other velocity through the air than of late."""
+    """No sideslip in flight; without vertical velocity, little incidence; without GPS, the airspeed of late."""
     along = through_air(s, 0)
     silent = s.fix_age_s > FIX_LIFE_S
     if s.aligned and along > SLOWEST_AIRSPEED_M_S:
@@ -328,9 +310,9 @@ def take_pseudo(s):  # type: ignore[no-untyped-def]
             s.cruise_sigma_m_s = SILENT_SPEED_M_S
         across = through_air(s, 1)
         fuse(s, -across, s.sideslip_sigma_m_s**2, s.gate)
-        if not s.gps_vertical_velocity and not s.height_age_s < HEIGHT_LIFE_S:
-            down = through_air(s, 2)
-            fuse(s, -down, INCIDENCE_M_S**2, s.gate)
+    if not (s.gps_vertical_velocity or silent):
+        down = through_air(s, 2)
+        fuse(s, -down, s.incidence_sigma_m_s**2, s.gate)
     if silent:
         for axis in range(3):
             aim = s.cruise_m_s if axis == 0 else 0.0
@@ -351,15 +333,10 @@ def advance_filter(s):  # type: ignore[no-untyped-def]
     s.fix_age_s += dt
     s.refusing_s += dt if s.refusing_s > 0.0 else 0.0
     s.pseudo_s += dt
-    s.height_age_s += dt
     s.lift_e_m_s2 += (s.force_e[2] - s.lift_e_m_s2) * min(dt / FIX_LIFE_S, 1.0)
-    corrected = (bits & (HAS_FIX | HAS_MAG | HAS_AIR | HAS_BARO)) != 0
+    corrected = (bits & (HAS_FIX | HAS_MAG | HAS_AIR)) != 0
     if bits & HAS_FIX:
         take_fix(s, i)
-        if not s.gps_vertical_velocity and not s.has_baro and s.w_fix_down_m[i] != 0.0:
-            take_height(s, s.w_fix_down_m[i] + s.w_fix_early_s[i] * s.v_e_m_s[2], s.gps_filter_s)
-    if bits & HAS_BARO:
-        take_height(s, s.w_baro_down_m[i], 0.0)
     if bits & HAS_MAG:
         take_mag(s, i)
     if bits & HAS_AIR:

@@ -13,9 +13,6 @@ WIND     2     north and east velocity of the air
 LATENCY  1     from the moment a fix is true to its arrival
 =======  ====  =====================================================================================
 
-Where the receiver reports no vertical velocity there is none inside it to follow: the third number of LAG then is
-the position downward (`DOWN`), as heights report it.
-
 An attitude error in earth axes keeps the heading, which may be quite unknown, apart from the tilt, which is not.
 
 The covariance ``P`` is advanced as ``F (F P)^T`` by row operations alone: F differs from the identity in nine rows.
@@ -37,11 +34,11 @@ from estimator.screening import G_M_S2
 
 N = 21
 TILT, VEL, BIAS, GAIN, FORCE, LAG, WIND_NE, LATENCY = 0, 3, 6, 9, 12, 15, 18, 20
-DOWN = LAG + 2
 
 FULL = 0.97  # share of the full scale from which on a reading may be cut off
 CUT_RAD_S, CUT_M_S2, CUT_S = 1.0, 10.0, 0.1  # sigma and correlation time of what is then missing
 CROSS_S = 2.0  # how long an error that turns with the body keeps its direction: about a radian of turn
+FORCE_GAIN_SHARE = 0.5  # relative gain error of an accelerometer, of its bias sigma in g: pulling, it errs by more
 LATENCY_WALK_S_SQRT_S = 0.001  # a latency that is learnt may change: sigma after one second
 BIAS_LIMIT = 6.0  # no bias, gain or wind is believed beyond this many initial sigmas
 
@@ -104,7 +101,9 @@ def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
         for j in range(3):
             s.R_filter_eb[i, j] = s.R_half[i, j]
     turn_in_body(s.R_filter_eb, x, y, z)
-    lag_weights(s, dt)
+    # The receiver's filter, dy/dt = (v - y) / T, solved exactly for a velocity that is linear within the sample.
+    keep, end = filter_weights(s.gps_filter_s, dt)
+    s.lag_keep, s.lag_end = keep, end
     for i in range(3):
         f = 0.0
         for j in range(3):
@@ -112,7 +111,7 @@ def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
         s.force_e[i] = f
         before = s.v_e_m_s[i]
         s.v_e_m_s[i] = before + dt * (f + G_M_S2 if i == 2 else f)
-        lagged = s.lag_keep[i] * s.lagged_v_e_m_s[i] + s.lag_old[i] * before + s.lag_end[i] * s.v_e_m_s[i]
+        lagged = keep * s.lagged_v_e_m_s[i] + (1.0 - keep - end) * before + end * s.v_e_m_s[i]
         s.lagged_rate_m_s2[i] = (lagged - s.lagged_v_e_m_s[i]) / dt
         s.lagged_v_e_m_s[i] = lagged
 
@@ -128,26 +127,13 @@ def filter_weights(time_constant_s, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def lag_weights(s, dt):  # type: ignore[no-untyped-def]
-    """Set what LAG keeps of itself over a sample, and takes of the velocity at its start and end.
-
-    The receiver's filter, dy/dt = (v - y) / T, solved exactly for a velocity that is linear within the sample; where
-    there is no vertical velocity in it, the integral of that velocity.
-    """
-    keep, end = filter_weights(s.gps_filter_s, dt)
-    for i in range(3):
-        s.lag_keep[i], s.lag_old[i], s.lag_end[i] = keep, 1.0 - keep - end, end
-    if not s.gps_vertical_velocity:
-        s.lag_keep[2], s.lag_old[2], s.lag_end[2] = 1.0, 0.5 * dt, 0.5 * dt
-
-
-@kernel
 def apply_transition(P, s, dt):  # type: ignore[no-untyped-def]
     """``P <- F P``, in place, with the values that `advance_state` kept (Sola 7.2, with the states added here)."""
     R, f, w = s.R_half, s.force_e, s.rate_b
+    keep, end = s.lag_keep, s.lag_end
+    old = 1.0 - keep - end
     f0, f1, f2 = dt * f[0], dt * f[1], dt * f[2]
     for i in range(3):
-        keep, old = s.lag_keep[i], s.lag_old[i]
         for j in range(N):
             P[LAG + i, j] = keep * P[LAG + i, j] + old * P[VEL + i, j]
     for j in range(N):  # d(vel)/dt = tilt x f - R force_bias
@@ -170,7 +156,6 @@ def apply_transition(P, s, dt):  # type: ignore[no-untyped-def]
             P[TILT + i, j] -= b0 * P[BIAS, j] + b1 * P[BIAS + 1, j] + b2 * P[BIAS + 2, j]
             P[TILT + i, j] -= g0 * P[GAIN, j] + g1 * P[GAIN + 1, j] + g2 * P[GAIN + 2, j]
     for i in range(3):
-        end = s.lag_end[i]
         for j in range(N):
             P[LAG + i, j] += end * P[VEL + i, j]
 
@@ -210,10 +195,9 @@ def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-de
     # An error with variance v and correlation time t acts, over longer times, as white noise of 2 v t.
     tilt = 0.5 * s.gyro_noise_rad_s_sqrt_hz**2 + 2.0 * CROSS_S * s.gyro_cross_axis**2 * squared
     velocity = 0.5 * s.force_noise_m_s2_sqrt_hz**2
-    velocity = max(velocity, s.x_vib * s.shaking_m2_s4 * dt)
     f = s.force_e
     pull = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) - G_M_S2
-    velocity += 2.0 * CROSS_S * (s.x_gain * pull) ** 2
+    velocity += 2.0 * CROSS_S * (FORCE_GAIN_SHARE * s.force_bias_sigma_m_s2 / G_M_S2 * pull) ** 2
     if gyro_cut:
         tilt += 2.0 * CUT_S * CUT_RAD_S**2
     if force_cut:
@@ -223,18 +207,11 @@ def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-de
     grow(P, BIAS, 3, s.gyro_walk_rad_s_sqrt_s**2 * dt, s.gyro_bias_sigma_rad_s**2)
     grow(P, WIND_NE, 2, s.wind_walk_m_s_sqrt_s**2 * dt, s.wind_sigma_m_s**2)
     grow(P, LATENCY, 1, LATENCY_WALK_S_SQRT_S**2 * dt, s.gps_latency_sigma_s**2)
-    if not s.gps_vertical_velocity:
-        grow(P, DOWN, 1, s.height_walk_m_sqrt_s**2 * dt, 1e4)
 
 
 @kernel
 def predict(s, gyro, force, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-def]
     """Advance state and covariance by one inertial sample."""
-    share = min(dt / 1.0, 1.0)
-    for i in range(3):
-        step = force[i] - s.last_force[i]
-        s.shaking_m2_s4 += (step * step / 6.0 - s.shaking_m2_s4 / 3.0) * share
-        s.last_force[i] = force[i]
     advance_state(s, gyro, force, dt)
     apply_transition(s.P, s, dt)  # F P
     transpose(s.P)  # (F P)^T = P F^T
@@ -249,7 +226,8 @@ def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    bool    False where the innovation is more than `gate` of its own sigmas, and nothing was changed
+    bool    False where the innovation is more than `gate` of its own sigmas, and nothing was changed; the variance
+            of the innovation is left in ``s.expected``
     """
     P, h, gain, left = s.P, s.h, s.gain, s.left
     expected = variance
@@ -261,8 +239,7 @@ def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
                 left[i] += P[j, i] * h[j]
     for i in range(N):
         expected += h[i] * left[i]
-    s.nis = innovation * innovation / expected
-    s.inn=innovation
+    s.expected = expected
     if not innovation * innovation <= gate * gate * expected:  # written so that NaN is refused
         return False
     for i in range(N):

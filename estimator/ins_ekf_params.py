@@ -49,13 +49,12 @@ class InsEkfParams:
     gps_latency_s : float               from the moment a fix is true to its arrival, at most 12.5
     gps_latency_sigma_s : float         of that latency, which is learnt in flight; 0: it is known and not learnt
     gps_stamped : bool                  use the fix's own time stamp instead, where it is finite and at most 2 s old
-    gps_vertical_velocity : bool        False: the third component of a fix is no measurement; heights take its place
+    gps_vertical_velocity : bool        False: the third component of a fix is no measurement
     gps_lag_sigma_s : float             jitter of filter and latency from fix to fix; inflates a fix while turning
-    height_noise_m : float              of a height, barometric or by GPS, where the vertical velocity is not reported
-    height_walk_m_sqrt_s : float        its error wanders, sigma after one second
     wind_sigma_m_s : float              of each horizontal component of the wind
     wind_walk_m_s_sqrt_s : float        the wind walks, sigma after one second
     sideslip_sigma_m_s : float          of the velocity along the wing, by slip and gusts, every 0.2 s
+    incidence_sigma_m_s : float         of that along the body's z axis, likewise; used without vertical velocity
     use_airspeed : bool                 use airspeeds where they come
     airspeed_noise_m_s : float          sigma of an airspeed
     use_magnetometer : bool             use the magnetometer's heading where it comes (calibrated, that is); otherwise
@@ -83,11 +82,10 @@ class InsEkfParams:
     gps_stamped: bool = True
     gps_vertical_velocity: bool = True
     gps_lag_sigma_s: float = 0.02
-    height_noise_m: float = 0.5
-    height_walk_m_sqrt_s: float = 0.5
     wind_sigma_m_s: float = 4.0
     wind_walk_m_s_sqrt_s: float = 0.1
     sideslip_sigma_m_s: float = 1.4
+    incidence_sigma_m_s: float = 3.0
     use_airspeed: bool = True
     airspeed_noise_m_s: float = 1.0
     use_magnetometer: bool = False
@@ -95,11 +93,6 @@ class InsEkfParams:
     magnetic_noise_rad: float = math.radians(5.0)
     min_speed_m_s: float = 3.0
     gate: float = 5.0
-    x_vib: float = 0.0
-    x_gain: float = 0.0
-    x_adapt: float = 0.0
-    x_soft: float = 0.0
-    x_huber: float = 0.0
     gyro_range_rad_s: float = GYRO_RANGE_RAD_S
     force_range_m_s2: float = FORCE_RANGE_M_S2
 
@@ -133,6 +126,6 @@ class InsEkfParams:
 
 _MAY_BE_INFINITE = ("gyro_full_scale_rad_s", "force_full_scale_m_s2")
 _MAY_BE_ZERO = (
-    *FLOORS, "x_vib", "x_gain", "x_adapt", "x_soft", "x_huber", "gps_filter_s", "gps_latency_s", "gps_latency_sigma_s", "gps_lag_sigma_s", "height_walk_m_sqrt_s",
+    *FLOORS, "gps_filter_s", "gps_latency_s", "gps_latency_sigma_s", "gps_lag_sigma_s",
     "wind_walk_m_s_sqrt_s",
 )  # fmt: skip
