@@ -1,30 +1,39 @@
-"""The bound: an inertial navigation filter that models the sensors, for what the simpler estimators leave undone.
+"""An inertial navigation filter that models its sensors: what accuracy is possible, at twenty times the cost.
 
-An error-state Kalman filter of twenty states (`estimator.ins_ekf_kernels`): attitude, velocity, gyro bias and gain,
-accelerometer bias, the velocity inside the GPS receiver behind its filter, and the horizontal wind.  It is told how
-good its sensors are, and tells how good its estimate is (`InsEkf.sigma`).
+An error-state Kalman filter of 21 states (`estimator.ins_ekf_kernels`): attitude, velocity, gyro bias and gain,
+accelerometer bias, the velocity inside the GPS receiver behind its filter, the horizontal wind, and the latency of the
+receiver.  `InsEkfParams` says how good its sensors are; `InsEkf.sigma` says how good its estimate is.
 
-*Delayed horizon.*  A fix is old when it comes.  The filter therefore lives as far back as the oldest fix can be;
-inertial samples wait in a buffer, each fix beside the sample in which it was true.  The attitude of the present is
-that of the filter, turned on by the gyro samples that wait, and anew after every correction.
+*Delayed horizon.*  A fix is old when it arrives.  The filter therefore runs one latency behind the present; inertial
+samples wait in a buffer, each fix beside the sample in which it was true.  The attitude of the present is that of the
+filter, integrated forward with the waiting gyro samples, again after every correction.
 
-*Sideslip.*  An aeroplane flies where its nose points: that the velocity through the air has no part along the wing
-is a measurement five times a second.  It parts nose and course, and so tells wind and heading.
+*Latency.*  A fix with a plausible time stamp is placed by the stamp.  Any other is placed by the latency, whose error
+dL is a state: the receiver reported y(t - dL) = y(t) - dL dy/dt, so the gradient of a fix is -dy/dt, which is nonzero
+whenever the aeroplane accelerates (Skog and Handel; Li and Mourikis).  A fix that was placed before the latency
+changed is moved along the same tangent.  `InsEkf.learnt` reports the latency once it is known.  A delay and a
+first-order filter look alike at low frequencies: a wrong ``gps_filter_s`` is largely absorbed by the latency.
 
-*Heading at the start.*  A Kalman filter bears no error of half a turn.  Until the aeroplane moves, the heading is
-left at north and does no harm: nothing measured has a direction.  The throw is then integrated like any motion, in
-a frame of unknown heading; once the GPS reports a velocity, the angle between that and the velocity believed to
-be inside the receiver is the error of heading, whatever the wind.  The whole estimate is turned by it, and the fix
-is then taken in with the heading (and the velocities that turn with it) held for uncertain by a radian.  A start in the
-air is the same, with one more unknown: the speed along the nose, which is what makes the velocities equally long.
+*Sideslip.*  An aeroplane flies where its nose points: that the velocity through the air has no component along the
+wing is a measurement five times a second.  It separates nose and course, and so yields wind and heading.  Where the
+receiver reports no vertical velocity, the same is assumed of the body's z axis, with a larger sigma.
+
+*Heading at the start.*  A Kalman filter cannot represent an error of half a turn.  Until the aeroplane moves, the
+heading is that of the magnetometer, or north, and does no harm: nothing measured has a direction.  The throw is then
+integrated like any motion, in a frame of unknown heading; once the GPS reports a velocity, the angle between that and
+the velocity believed to be inside the receiver is the heading error, whatever the wind.  The whole estimate is turned
+by it, and the fix is then fused with a heading (and the velocities that turn with it) uncertain by a radian.  A start
+in the air is the same with one more unknown, the speed along the nose, which makes the velocities equally long.  A fix
+much faster than a start at rest allows means that the flight began in the air after all.
 
 *Readings cut off* at full scale: for these samples the process noise is that of what may be missing.
 
-*Without GPS* for two seconds, velocity through the air is believed to be what it was, along the nose, with a large
+*Without GPS* for two seconds, the velocity through the air is assumed to be what it was, along the nose, with a large
 sigma; without any velocity ever, zero.  That is gravity aiding, weak enough for turns, for as long as it lasts.
 
-*Refused fixes.*  An innovation beyond `gate` sigmas is refused and counted.  Where nothing is believed for three
-seconds the filter is wrong, not the receiver: it starts again in the air, from its attitude.
+*Rejected fixes.*  An innovation beyond `gate` sigmas is rejected and counted.  Where innovations stay larger than their
+sigmas, the receiver's noise is scaled up to match.  Where nothing is accepted for three seconds the filter is wrong,
+not the receiver: it starts again in the air, from its attitude.
 
 The earth's rotation (15 deg/h) and curvature are left out; they are below the gyro's walk.
 
@@ -33,6 +42,10 @@ References
 J. Sola, "Quaternion kinematics for the error-state Kalman filter", 2017, arXiv:1711.02508.
 A. Khosravian, J. Trumpf, R. Mahony, T. Hamel, "State estimation for invariant systems on Lie groups with delayed
 output measurements", Automatica 2016: observer on delayed data, predictor to the present.
+I. Skog and P. Handel, "Time synchronization errors in loosely coupled GPS-aided inertial navigation systems", IEEE
+Transactions on Intelligent Transportation Systems 12(4), 2011: the latency as a state, and when it is observable.
+M. Li and A. I. Mourikis, "Online temporal calibration for camera-IMU systems: theory and algorithms", International
+Journal of Robotics Research 33(7), 2014: the same in a filter that moves the measurement as the estimate changes.
 T. A. Johansen et al., "On estimation of wind velocity, angle-of-attack and sideslip angle of small UAVs using
 standard sensors", ICUAS 2015.
 """

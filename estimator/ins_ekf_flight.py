@@ -43,7 +43,7 @@ START_TILT_RAD, RESTART_TILT_RAD = math.radians(15.0), 0.7
 STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the start
 FRAME_RAD = 0.01  # sigma of the heading before a match: none, in a frame of its own
 MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
-STANDING_M_S = 1.0  # sigma of a fix of exactly zero: receivers report that at low speed (static navigation)
+STANDING_M_S = 0.3  # sigma of a fix of exactly zero: some receivers report that at low speed (static navigation)
 SURPRISE_SHARE, MOST_SURPRISE = 0.1, 50.0  # weight of a fix in the mean, and the most that one can count
 CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR, STAMPED = 1, 2, 4, 8, 16, 32  # bits of a waiting sample
 
