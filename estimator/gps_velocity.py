@@ -93,6 +93,8 @@ class GpsVelocityParams:
     integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
     gps_filter_s : float       time constant of the receiver's velocity filter
     gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
+    gps_vertical_velocity : bool   False: the receiver reports no vertical velocity; Eqn 4 then compares the horizontal
+                               components alone
     launch_gate : float        the stand-in corrects nothing while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
     min_speed_m_s : float      slowest speed at which a velocity tells a heading
     declination_rad : float    of magnetic from true north, positive east; for the magnetometer
@@ -110,6 +112,7 @@ class GpsVelocityParams:
     integrate_below_rad_s: float = math.radians(60.0)
     gps_filter_s: float = 1.0
     gps_latency_s: float = 0.3
+    gps_vertical_velocity: bool = True
     launch_gate: float = 0.2
     min_speed_m_s: float = 3.0
     declination_rad: float = 0.0
@@ -127,7 +130,7 @@ class GpsVelocityParams:
         )  # fmt: skip
         for f in fields(self):
             value = getattr(self, f.name)
-            if f.name in ("yaw_reference", "calibration"):
+            if f.name in ("yaw_reference", "calibration", "gps_vertical_velocity"):
                 continue
             if f.name == "declination_rad":
                 if not abs(value) <= math.pi:
@@ -145,7 +148,7 @@ class GpsVelocityParams:
 
 
 _PARAMS = tuple(
-    Column(f.name, (), "see GpsVelocityParams", integer=f.name == "yaw_reference")
+    Column(f.name, (), "see GpsVelocityParams", integer=f.name in ("yaw_reference", "gps_vertical_velocity"))
     for f in fields(GpsVelocityParams)
     if f.name not in ("calibration", *_RANGES)
 )
@@ -218,6 +221,8 @@ def roll_pitch_at_fix(s, dv_e_m_s):  # type: ignore[no-untyped-def]
     """Eqns 3 and 4 over the interval between two fixes, `dv_e_m_s` the change of the reported velocity."""
     left0, left1, left2 = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
     right0, right1, right2 = -dv_e_m_s[0], -dv_e_m_s[1], s.interval_s * G_M_S2 - dv_e_m_s[2]
+    if not s.gps_vertical_velocity:
+        right2 = left2  # as felt: the cross product then compares the horizontal components
     # Eqn 4, divided by both lengths; by no less than half of gravity's, so that a fall without weight says little.
     least = 0.5 * s.interval_s * G_M_S2
     left_length = max(np.sqrt(left0 * left0 + left1 * left1 + left2 * left2), least)
@@ -286,7 +291,8 @@ def yaw_at_fix(s):  # type: ignore[no-untyped-def]
 def take_fix(row, s):  # type: ignore[no-untyped-def]
     """All that happens at a GPS report."""
     v = row.gps_v_e_m_s
-    if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
+    vertical = abs(v[2]) < 1000.0 or not s.gps_vertical_velocity
+    if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and vertical):
         refuse(s, GPS)
         return
     apply_corrections(s)

@@ -1,30 +1,39 @@
-"""The bound: an inertial navigation filter that models the sensors, for what the simpler estimators leave undone.
+"""An inertial navigation filter that models its sensors: what accuracy is possible, at twenty times the cost.
 
-An error-state Kalman filter of twenty states (`estimator.ins_ekf_kernels`): attitude, velocity, gyro bias and gain,
-accelerometer bias, the velocity inside the GPS receiver behind its filter, and the horizontal wind.  It is told how
-good its sensors are, and tells how good its estimate is (`InsEkf.sigma`).
+An error-state Kalman filter of 21 states (`estimator.ins_ekf_kernels`): attitude, velocity, gyro bias and gain,
+accelerometer bias, the velocity inside the GPS receiver behind its filter, the horizontal wind, and the latency of the
+receiver.  `InsEkfParams` says how good its sensors are; `InsEkf.sigma` says how good its estimate is.
 
-*Delayed horizon.*  A fix is old when it comes.  The filter therefore lives as far back as the oldest fix can be;
-inertial samples wait in a buffer, each fix beside the sample in which it was true.  The attitude of the present is
-that of the filter, turned on by the gyro samples that wait, and anew after every correction.
+*Delayed horizon.*  A fix is old when it arrives.  The filter therefore runs one latency behind the present; inertial
+samples wait in a buffer, each fix beside the sample in which it was true.  The attitude of the present is that of the
+filter, integrated forward with the waiting gyro samples, again after every correction.
 
-*Sideslip.*  An aeroplane flies where its nose points: that the velocity through the air has no part along the wing
-is a measurement five times a second.  It parts nose and course, and so tells wind and heading.
+*Latency.*  A fix with a plausible time stamp is placed by the stamp.  Any other is placed by the latency, whose error
+dL is a state: the receiver reported y(t - dL) = y(t) - dL dy/dt, so the gradient of a fix is -dy/dt, which is nonzero
+whenever the aeroplane accelerates (Skog and Handel; Li and Mourikis).  A fix that was placed before the latency
+changed is moved along the same tangent.  `InsEkf.learnt` reports the latency once it is known.  A delay and a
+first-order filter look alike at low frequencies: a wrong ``gps_filter_s`` is largely absorbed by the latency.
 
-*Heading at the start.*  A Kalman filter bears no error of half a turn.  Until the aeroplane moves, the heading is
-left at north and does no harm: nothing measured has a direction.  The throw is then integrated like any motion, in
-a frame of unknown heading; once the GPS reports a velocity, the angle between that and the velocity believed to
-be inside the receiver is the error of heading, whatever the wind.  The whole estimate is turned by it, and the fix
-is then taken in with the heading (and the velocities that turn with it) held for uncertain by a radian.  A start in the
-air is the same, with one more unknown: the speed along the nose, which is what makes the velocities equally long.
+*Sideslip.*  An aeroplane flies where its nose points: that the velocity through the air has no component along the
+wing is a measurement five times a second.  It separates nose and course, and so yields wind and heading.  Where the
+receiver reports no vertical velocity, the same is assumed of the body's z axis, with a larger sigma.
+
+*Heading at the start.*  A Kalman filter cannot represent an error of half a turn.  Until the aeroplane moves, the
+heading is that of the magnetometer, or north, and does no harm: nothing measured has a direction.  The throw is then
+integrated like any motion, in a frame of unknown heading; once the GPS reports a velocity, the angle between that and
+the velocity believed to be inside the receiver is the heading error, whatever the wind.  The whole estimate is turned
+by it, and the fix is then fused with a heading (and the velocities that turn with it) uncertain by a radian.  A start
+in the air is the same with one more unknown, the speed along the nose, which makes the velocities equally long.  A fix
+much faster than a start at rest allows means that the flight began in the air after all.
 
 *Readings cut off* at full scale: for these samples the process noise is that of what may be missing.
 
-*Without GPS* for two seconds, velocity through the air is believed to be what it was, along the nose, with a large
+*Without GPS* for two seconds, the velocity through the air is assumed to be what it was, along the nose, with a large
 sigma; without any velocity ever, zero.  That is gravity aiding, weak enough for turns, for as long as it lasts.
 
-*Refused fixes.*  An innovation beyond `gate` sigmas is refused and counted.  Where nothing is believed for three
-seconds the filter is wrong, not the receiver: it starts again in the air, from its attitude.
+*Rejected fixes.*  An innovation beyond `gate` sigmas is rejected and counted.  Where innovations stay larger than their
+sigmas, the receiver's noise is scaled up to match.  Where nothing is accepted for three seconds the filter is wrong,
+not the receiver: it starts again in the air, from its attitude.
 
 The earth's rotation (15 deg/h) and curvature are left out; they are below the gyro's walk.
 
@@ -33,12 +42,16 @@ References
 J. Sola, "Quaternion kinematics for the error-state Kalman filter", 2017, arXiv:1711.02508.
 A. Khosravian, J. Trumpf, R. Mahony, T. Hamel, "State estimation for invariant systems on Lie groups with delayed
 output measurements", Automatica 2016: observer on delayed data, predictor to the present.
+I. Skog and P. Handel, "Time synchronization errors in loosely coupled GPS-aided inertial navigation systems", IEEE
+Transactions on Intelligent Transportation Systems 12(4), 2011: the latency as a state, and when it is observable.
+M. Li and A. I. Mourikis, "Online temporal calibration for camera-IMU systems: theory and algorithms", International
+Journal of Robotics Research 33(7), 2014: the same in a filter that moves the measurement as the estimate changes.
 T. A. Johansen et al., "On estimation of wind velocity, angle-of-attack and sideslip angle of small UAVs using
 standard sensors", ICUAS 2015.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any, ClassVar
 
 import numpy as np
@@ -52,6 +65,7 @@ from estimator.ins_ekf_flight import (
     HAS_FIX,
     HAS_MAG,
     SIZE,
+    STAMPED,
     advance_filter,
     start_at_rest,
     start_in_air,
@@ -62,6 +76,7 @@ from estimator.ins_ekf_kernels import (
     FULL,
     GAIN,
     LAG,
+    LATENCY,
     TILT,
     VEL,
     WIND_NE,
@@ -69,17 +84,16 @@ from estimator.ins_ekf_kernels import (
     true_rate,
     turn_in_body,
 )
+from estimator.ins_ekf_params import FLOORS, InsEkfParams
 from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
 from estimator.rotation import level, renormalise
 from estimator.screening import (
     AIR,
     FORCE_GOOD,
-    FORCE_RANGE_M_S2,
     G_M_S2,
     GPS,
     GYRO_GOOD,
-    GYRO_RANGE_RAD_S,
     MAG,
     SCREEN,
     attitude_at_rest,
@@ -88,93 +102,12 @@ from estimator.screening import (
     screen,
 )
 
-LONGEST_LATENCY_S = 12.5
 LONGEST_STAMPED_S = 2.0  # a stamp further back is of another clock
+LEARNT_SHARE = 0.5  # a sigma below so much of what it was at the start means that something was learnt
+SHRINK_S = 0.005  # the horizon comes nearer by no more than this from fix to fix
 COAST_S = 0.25  # how long the last rate stands in for a broken gyro
 WIND_KNOWN_M_S = 1.5  # sigma, both axes together, of a wind worth telling
 GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigmas of a good attitude
-
-
-@dataclass(frozen=True, slots=True)
-class InsEkfParams:
-    """What the filter believes of its sensors and of the air; the defaults are the generic sensors.
-
-    Each sigma too small makes the estimate overconfident and slow to mend, too large noisy and slow to learn.
-
-    gyro_noise_rad_s_sqrt_hz : float    one-sided density of the white noise, quantisation included
-    gyro_bias_sigma_rad_s : float       of the bias at power-up, after a calibration if there was one
-    gyro_walk_rad_s_sqrt_s : float      the bias walks, sigma after one second
-    gyro_gain_sigma : float             of the relative gain error of each axis
-    gyro_cross_axis : float             of each axis' sensitivity to another
-    gyro_full_scale_rad_s : float       readings near it or beyond may be cut off
-    force_noise_m_s2_sqrt_hz : float    one-sided density of the accelerometer's white noise
-    force_bias_sigma_m_s2 : float       of its bias
-    force_full_scale_m_s2 : float       readings near it or beyond may be cut off
-    gps_noise_m_s : float               of each velocity component of a fix
-    gps_filter_s : float                time constant of the receiver's velocity filter; 0 is none
-    gps_latency_s : float               from the moment a fix is true to its arrival, at most 12.5
-    gps_stamped : bool                  believe the fix's own time stamp instead, where it is at most 2 s old
-    gps_lag_sigma_s : float             how well filter and latency are known; inflates a fix while turning
-    wind_sigma_m_s : float              of each horizontal component of the wind
-    wind_walk_m_s_sqrt_s : float        the wind walks, sigma after one second
-    sideslip_sigma_m_s : float          of the velocity along the wing, by slip and gusts, every 0.2 s
-    use_airspeed : bool                 believe air data where they come
-    airspeed_noise_m_s : float          sigma of an airspeed
-    use_magnetometer : bool             believe the magnetometer's heading where it comes (calibrated, that is)
-    declination_rad : float             magnetic north from true north, positive to the east
-    magnetic_noise_rad : float          sigma of a magnetic heading
-    min_speed_m_s : float               slowest ground speed that starts the heading
-    gate : float                        innovations beyond so many sigmas are refused
-    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
-    """
-
-    gyro_noise_rad_s_sqrt_hz: float = math.radians(0.07)
-    gyro_bias_sigma_rad_s: float = math.radians(1.0)
-    gyro_walk_rad_s_sqrt_s: float = math.radians(0.02)
-    gyro_gain_sigma: float = 0.015
-    gyro_cross_axis: float = 0.005
-    gyro_full_scale_rad_s: float = math.radians(300.0)
-    force_noise_m_s2_sqrt_hz: float = 0.004 * G_M_S2
-    force_bias_sigma_m_s2: float = 0.02 * G_M_S2
-    force_full_scale_m_s2: float = 3.0 * G_M_S2
-    gps_noise_m_s: float = 0.1
-    gps_filter_s: float = 1.0
-    gps_latency_s: float = 0.3
-    gps_stamped: bool = True
-    gps_lag_sigma_s: float = 0.02
-    wind_sigma_m_s: float = 4.0
-    wind_walk_m_s_sqrt_s: float = 0.1
-    sideslip_sigma_m_s: float = 1.4
-    use_airspeed: bool = True
-    airspeed_noise_m_s: float = 1.0
-    use_magnetometer: bool = False
-    declination_rad: float = 0.0
-    magnetic_noise_rad: float = math.radians(5.0)
-    min_speed_m_s: float = 3.0
-    gate: float = 5.0
-    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
-    force_range_m_s2: float = FORCE_RANGE_M_S2
-
-    def __post_init__(self) -> None:
-        may_be_zero = (
-            "gyro_walk_rad_s_sqrt_s", "gyro_cross_axis", "gps_filter_s", "gps_latency_s", "gps_lag_sigma_s",
-            "wind_walk_m_s_sqrt_s", "declination_rad",
-        )  # fmt: skip
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(f.default, bool):
-                continue
-            if f.name == "declination_rad":
-                if not abs(value) <= math.pi:
-                    raise ValueError(f"declination_rad is {value} rad; it must lie between -pi and pi")
-            elif not 0.0 <= value < math.inf or (value == 0.0 and f.name not in may_be_zero):
-                least = "zero or more" if f.name in may_be_zero else "more than zero"
-                raise ValueError(f"{f.name} is {value}; it must be a finite number, {least}")
-        for name in ("gyro_range_rad_s", "force_range_m_s2"):
-            if getattr(self, name) > 1e4:
-                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
-        if self.gps_latency_s > LONGEST_LATENCY_S:
-            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
 
 
 _PARAMS = tuple(
@@ -185,6 +118,7 @@ _PARAMS = tuple(
 _FILTER = (
     Column("R_filter_eb", (3, 3), "attitude at the filter's time"),
     Column("v_e_m_s", (3,), "velocity over the ground, at the filter's time"),
+    Column("calibrated_bias_b_rad_s", (3,), "gyro bias measured at power-up"),
     Column("gyro_gain", (3,), "what the gyro reads too much, per unit of rate"),
     Column("force_bias_b_m_s2", (3,), "what the accelerometer reads too much"),
     Column("lagged_v_e_m_s", (3,), "velocity inside the receiver, behind its filter"),
@@ -199,6 +133,10 @@ _FILTER = (
     Column("force_e", (3,), "specific force in it, earth axes"),
     Column("lag_keep", (), "weight of the old output of the receiver's filter"),
     Column("lag_end", (), "weight of its newest input"),
+    Column("expected", (), "variance of the last innovation"),
+    Column("surprise", (), "square of a fix's innovation over its variance, mean of late"),
+    Column("latency_s", (), "latency of a fix without a stamp, as far as it is learnt"),
+    Column("longest_latency_s", (), "the longest that is learnt"),
 )
 _AROUND = (
     Column("delay_s", (), "how far back the filter lives"),
@@ -206,6 +144,8 @@ _AROUND = (
     Column("aligned", (), "1 once the heading was found", integer=True),
     Column("fix_age_s", (), "time since a fix was believed"),
     Column("refusing_s", (), "time since the first of the fixes refused of late, 0 where the last was believed"),
+    Column("mag_started", (), "1 once an uncalibrated magnetometer gave a first heading", integer=True),
+    Column("unstamped", (), "how many fixes without a stamp came", integer=True),
     Column("pseudo_s", (), "time since the last pseudo-measurements"),
     Column("cruise_m_s", (), "airspeed of late, for when the GPS falls silent"),
     Column("cruise_sigma_m_s", (), "how well it is known"),
@@ -220,6 +160,7 @@ _AROUND = (
     Column("w_bits", (SIZE,), "what is to be known of it", integer=True),
     Column("w_fix_v_e_m_s", (SIZE, 3), "velocity of the fix that was true in it"),
     Column("w_fix_early_s", (SIZE,), "how long before its end"),
+    Column("w_fix_latency_s", (SIZE,), "latency by which that place was chosen"),
     Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
     Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
 )
@@ -262,21 +203,25 @@ def push(row, s, good):  # type: ignore[no-untyped-def]
 def attach_fix(row, s):  # type: ignore[no-untyped-def]
     """Put the fix of `row` beside the waiting sample in which it was true."""
     v = row.gps_v_e_m_s
-    if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0):
+    vertical = abs(v[2]) < 1000.0 or not s.gps_vertical_velocity
+    if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and vertical):
         refuse(s, GPS)
         return
-    late_s = s.gps_latency_s
-    if s.gps_stamped and 0.0 <= row.t_s - row.gps_t_s <= LONGEST_STAMPED_S:
-        late_s = row.t_s - row.gps_t_s
-    s.delay_s = max(s.delay_s, late_s)
+    bits, late_s = HAS_FIX, s.latency_s
+    if s.gps_stamped and 0.0 <= row.t_s - row.gps_t_s <= LONGEST_STAMPED_S:  # written so that NaN is no stamp
+        bits, late_s = HAS_FIX | STAMPED, row.t_s - row.gps_t_s
+    else:
+        s.unstamped += 1
+    s.delay_s = max(late_s, s.delay_s - SHRINK_S)
     i = (s.oldest + s.waiting - 1) % SIZE
     for back in range(1, s.waiting):
         earlier = (s.oldest + s.waiting - 1 - back) % SIZE
         if s.w_clock_s[earlier] < s.clock_s - late_s - 1e-9:
             break
         i = earlier
-    s.w_bits[i] |= HAS_FIX
+    s.w_bits[i] |= bits
     s.w_fix_early_s[i] = min(max(s.w_clock_s[i] - (s.clock_s - late_s), 0.0), s.w_dt_s[i])
+    s.w_fix_latency_s[i] = s.clock_s - s.w_clock_s[i] + s.w_fix_early_s[i]
     for j in range(3):
         s.w_fix_v_e_m_s[i, j] = v[j]
 
@@ -285,7 +230,7 @@ def attach_fix(row, s):  # type: ignore[no-untyped-def]
 def attach_others(row, s):  # type: ignore[no-untyped-def]
     """Put magnetometer and air data of `row` beside the newest sample."""
     i = (s.oldest + s.waiting - 1) % SIZE
-    if row.mag_new and s.use_magnetometer:
+    if row.mag_new and (s.use_magnetometer or not (s.mag_started or s.aligned)):
         m = row.mag_b_ut
         if abs(m[0]) < 1e4 and abs(m[1]) < 1e4 and abs(m[2]) < 1e4:
             s.w_bits[i] |= HAS_MAG
@@ -398,15 +343,28 @@ class InsEkf(Compiled):
         s = self._state[0]
         self._state.fill(0)
         for f in fields(self.params):
-            s[f.name] = getattr(self.params, f.name)
-        s["delay_s"] = self.params.gps_latency_s
+            s[f.name] = max(getattr(self.params, f.name), FLOORS.get(f.name, -math.inf))
+        s["delay_s"] = s["latency_s"] = self.params.gps_latency_s
+        s["longest_latency_s"] = self.params.longest_latency_s
         s["lift_e_m_s2"] = -G_M_S2
         s["R_eb"] = s["R_filter_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
         if on_ground is None:
             start_in_air(self._state)
             return
-        s["gyro_bias_b_rad_s"] = offset_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = s["calibrated_bias_b_rad_s"] = offset_at_rest(on_ground)
         start_at_rest(self._state, np.array(on_ground.force_b_m_s2, np.float64))
+
+    @property
+    def learnt(self) -> dict[str, float]:
+        """Properties of the instruments learnt in flight, by name: ``gps_latency_s``, or nothing.
+
+        The latency counts as learnt once fixes without a stamp have come and its sigma has fallen below half of
+        `InsEkfParams.gps_latency_sigma_s`.
+        """
+        s, prior_s = self._state[0], self.params.gps_latency_sigma_s
+        if prior_s <= 0.0 or not s["unstamped"] or not s["P"][LATENCY, LATENCY] < (LEARNT_SHARE * prior_s) ** 2:
+            return {}
+        return {"gps_latency_s": float(s["latency_s"])}
 
     def sigma(self) -> dict[str, Array]:
         """Standard deviations that the filter believes in, at its own time: a delay behind the present.
@@ -414,11 +372,12 @@ class InsEkf(Compiled):
         Returns
         -------
         dict    tilt_e_rad (3,), v_e_m_s (3,), gyro_bias_b_rad_s (3,), gyro_gain (3,), force_bias_b_m_s2 (3,),
-                lagged_v_e_m_s (3,), wind_e_m_s (2,)
+                lagged_v_e_m_s (3,), wind_e_m_s (2,), gps_latency_s (1,)
         """
         sigmas = np.sqrt(np.diagonal(self._state["P"][0]))
         parts = {
             "tilt_e_rad": (TILT, 3), "v_e_m_s": (VEL, 3), "gyro_bias_b_rad_s": (BIAS, 3), "gyro_gain": (GAIN, 3),
             "force_bias_b_m_s2": (FORCE, 3), "lagged_v_e_m_s": (LAG, 3), "wind_e_m_s": (WIND_NE, 2),
+            "gps_latency_s": (LATENCY, 1),
         }  # fmt: skip
         return {name: sigmas[first : first + count] for name, (first, count) in parts.items()}

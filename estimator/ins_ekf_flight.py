@@ -12,6 +12,7 @@ from estimator.ins_ekf_kernels import (
     FORCE,
     GAIN,
     LAG,
+    LATENCY,
     TILT,
     VEL,
     WIND_NE,
@@ -42,7 +43,9 @@ START_TILT_RAD, RESTART_TILT_RAD = math.radians(15.0), 0.7
 STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the start
 FRAME_RAD = 0.01  # sigma of the heading before a match: none, in a frame of its own
 MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
-CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR = 1, 2, 4, 8, 16  # bits of a waiting sample
+STANDING_M_S = 0.3  # sigma of a fix of exactly zero: some receivers report that at low speed (static navigation)
+SURPRISE_SHARE, MOST_SURPRISE = 0.1, 50.0  # weight of a fix in the mean, and the most that one can count
+CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR, STAMPED = 1, 2, 4, 8, 16, 32  # bits of a waiting sample
 
 
 # How it starts
@@ -69,6 +72,7 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     forget(s.P, VEL, 3, np.hypot(speed_sigma_m_s, STEADY_M_S))
     for i in range(3):  # a receiver in steady motion holds the velocity there is
         s.P[VEL + i, LAG + i] = s.P[LAG + i, VEL + i] = speed_sigma_m_s**2
+    forget(s.P, LATENCY, 1, s.gps_latency_sigma_s)
     length = max(np.hypot(s.R_filter_eb[0, 0], s.R_filter_eb[1, 0]), 1e-3)
     s.nose_at_start[0], s.nose_at_start[1] = s.R_filter_eb[0, 0] / length, s.R_filter_eb[1, 0] / length
     forget(s.P, WIND_NE, 2, s.wind_sigma_m_s)
@@ -77,6 +81,7 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     s.seeded = s.aligned = 0
     s.cruise_m_s, s.cruise_sigma_m_s = 0.0, 10.0
     s.refusing_s = 0.0
+    s.surprise = 1.0
 
 
 @kernel
@@ -122,6 +127,8 @@ def turn_heading(s, angle_rad):  # type: ignore[no-untyped-def]
     c, z = np.cos(angle_rad), np.sin(angle_rad)
     for v in (s.v_e_m_s, s.lagged_v_e_m_s, s.lagged_rate_m_s2, s.wind_e_m_s):
         v[0], v[1] = c * v[0] - z * v[1], z * v[0] + c * v[1]
+    n = s.nose_at_start
+    n[0], n[1] = c * n[0] - z * n[1], z * n[0] + c * n[1]
     turn_pairs(s.P, c, z)
     transpose(s.P)
     turn_pairs(s.P, c, z)
@@ -165,44 +172,91 @@ def begin_with_fix(s, z, fast):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def find_heading(s, z, speed):  # type: ignore[no-untyped-def]
+    """Turn the estimate so that the velocity believed to be inside the receiver is that of the fix `z`, shape (3,).
+
+    Returns
+    -------
+    bool    False where that velocity is not known well enough, or too slow: the fix cannot be used
+    """
+    y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
+    if s.P[LAG, LAG] + s.P[LAG + 1, LAG + 1] > max(speed, s.wind_sigma_m_s * 1.5) ** 2:
+        s.seeded = 0  # drifted too far to be matched: begin again with the next fix
+        s.fix_age_s = math.inf
+        return False
+    if np.hypot(y0, y1) < 0.5 * s.min_speed_m_s:
+        return False  # moving, and not yet known to be
+    turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
+    doubt_heading(s, MATCH_RAD)
+    s.aligned = 1
+    return True
+
+
+@kernel
+def was_never_at_rest(s, speed):  # type: ignore[no-untyped-def]
+    """Whether a fix is too fast for a start at rest: the flight did not begin where the gyros were calibrated."""
+    sigma = np.sqrt(max(s.P[LAG, LAG], s.P[LAG + 1, LAG + 1]))
+    return speed - np.hypot(s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]) > 0.5 * s.min_speed_m_s + s.gate * sigma
+
+
+@kernel
 def take_fix(s, i):  # type: ignore[no-untyped-def]
     """Take in the fix beside waiting sample `i`; the filter is at the end of that sample."""
     z, early = s.w_fix_v_e_m_s[i], s.w_fix_early_s[i]
+    unsure = STANDING_M_S if z[0] == 0.0 and z[1] == 0.0 else 0.0  # sigma beside the receiver's noise
     for j in range(3):  # to the end of the sample
         z[j] += early * s.lagged_rate_m_s2[j]
     speed = np.hypot(z[0], z[1])
     fast = speed >= s.min_speed_m_s
+    if fast and s.seeded and not s.aligned and was_never_at_rest(s, speed):
+        s.seeded = 0
+        s.fix_age_s = math.inf
     if not s.seeded:
         begin_with_fix(s, z, fast)
-    turning = 0.0  # sigma of a horizontal velocity that has no direction yet
-    if not s.aligned and not fast:
-        turning = speed
-    elif not s.aligned:
-        y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
-        if s.P[LAG, LAG] + s.P[LAG + 1, LAG + 1] > max(speed, s.wind_sigma_m_s * 1.5) ** 2:
-            s.seeded = 0  # drifted too far to be matched: begin again with the next fix
-            s.fix_age_s = math.inf
+    if not s.aligned:
+        if not fast:
+            unsure = max(speed, unsure)  # a horizontal velocity has no direction yet
+        elif not find_heading(s, z, speed):
             return
-        if np.hypot(y0, y1) < 0.5 * s.min_speed_m_s:
-            return  # moving, and not yet known to be
-        turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
-        doubt_heading(s, MATCH_RAD)
-        s.aligned = 1
-    believed = 0
-    for j in range(3):
-        no_gradient(s.h)
-        s.h[LAG + j] = 1.0
-        variance = s.gps_noise_m_s**2 + (s.gps_lag_sigma_s * s.lagged_rate_m_s2[j]) ** 2
-        if j < 2:
-            variance += turning * turning
-        believed += fuse(s, z[j] - s.lagged_v_e_m_s[j], variance, s.gate)
-    if believed == 3:
+    if believe_velocity(s, i, z, unsure):
         s.fix_age_s = s.refusing_s = 0.0
         return
     refuse(s, GPS)
     s.refusing_s = max(s.refusing_s, 1e-9)
     if s.refusing_s > RESTART_S:
         restart(s)
+
+
+@kernel
+def believe_velocity(s, i, z, unsure):  # type: ignore[no-untyped-def]
+    """Fuse the velocity `z`, shape (3,), of the fix beside waiting sample `i`; whether all of it was believed.
+
+    unsure : further sigma of the horizontal components, m/s
+
+    Where innovations are larger than they should be, the noise of the receiver is taken for larger in proportion: it
+    is that of another receiver, or the aeroplane shakes its sensors more than data sheets know.
+    """
+    stamped = (s.w_bits[i] & STAMPED) != 0
+    components = 3 if s.gps_vertical_velocity else 2
+    noise = s.gps_noise_m_s**2
+    more = noise * (max(1.0, s.surprise) - 1.0)
+    believed, surprise = 0, 0.0
+    for j in range(components):
+        rate = s.lagged_rate_m_s2[j]
+        no_gradient(s.h)
+        s.h[LAG + j] = 1.0
+        innovation = z[j] - s.lagged_v_e_m_s[j]
+        if not stamped:  # a latency longer by dL: the fix was true earlier, y(t - dL) = y - dL dy/dt
+            innovation += (s.latency_s - s.w_fix_latency_s[i]) * rate
+            s.h[LATENCY] = -rate if s.aligned else 0.0
+        variance = noise + more + (s.gps_lag_sigma_s * rate) ** 2
+        if j < 2:
+            variance += unsure * unsure
+        believed += fuse(s, innovation, variance, s.gate)
+        surprise += min(innovation * innovation / (s.expected - more), MOST_SURPRISE)
+    if s.aligned:
+        s.surprise += SURPRISE_SHARE * (surprise / components - s.surprise)
+    return believed == components
 
 
 @kernel
@@ -216,8 +270,17 @@ def restart(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_mag(s, i):  # type: ignore[no-untyped-def]
-    """Take in the magnetic heading beside waiting sample `i`; the first one starts the heading."""
+    """Take in the magnetic heading beside waiting sample `i`; the first one starts the heading.
+
+    The iron of an aeroplane can turn a field that was never calibrated by any angle: such a field only says where
+    the frame of unknown heading points until a moving fix comes.
+    """
     innovation = wrap(s.declination_rad - magnetic_course(s, s.w_mag_b_ut[i]))
+    if not s.use_magnetometer:
+        if not s.aligned:
+            turn_heading(s, innovation)
+        s.mag_started = 1
+        return
     if not s.aligned:
         turn_heading(s, innovation)
         doubt_heading(s, MATCH_RAD)
@@ -238,7 +301,7 @@ def take_airspeed(s, i):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_pseudo(s):  # type: ignore[no-untyped-def]
-    """No sideslip in flight; without GPS, no other velocity through the air than of late."""
+    """No sideslip in flight; without vertical velocity, little incidence; without GPS, the airspeed of late."""
     along = through_air(s, 0)
     silent = s.fix_age_s > FIX_LIFE_S
     if s.aligned and along > SLOWEST_AIRSPEED_M_S:
@@ -247,6 +310,9 @@ def take_pseudo(s):  # type: ignore[no-untyped-def]
             s.cruise_sigma_m_s = SILENT_SPEED_M_S
         across = through_air(s, 1)
         fuse(s, -across, s.sideslip_sigma_m_s**2, s.gate)
+    if not (s.gps_vertical_velocity or silent):
+        down = through_air(s, 2)
+        fuse(s, -down, s.incidence_sigma_m_s**2, s.gate)
     if silent:
         for axis in range(3):
             aim = s.cruise_m_s if axis == 0 else 0.0
@@ -298,6 +364,7 @@ def keep_sane(s):  # type: ignore[no-untyped-def]
         level(s.R_filter_eb)
     if not (whole and total < 1e9):
         for i in range(3):
-            s.gyro_bias_b_rad_s[i] = s.gyro_gain[i] = s.force_bias_b_m_s2[i] = 0.0
+            s.gyro_bias_b_rad_s[i] = s.calibrated_bias_b_rad_s[i]
+            s.gyro_gain[i] = s.force_bias_b_m_s2[i] = 0.0
         start(s, RESTART_TILT_RAD, s.wind_sigma_m_s)
         s.rejected += 1

@@ -1,16 +1,17 @@
 """The Kalman filter inside `estimator.ins_ekf`: its error state, one prediction, one scalar measurement.
 
-Error state, true value less estimate, N = 20 numbers:
+Error state, true value less estimate, N = 21 numbers:
 
-======  ====  =====================================================================================
-TILT    3     small rotation in earth axes, ``R_true = Exp(tilt) R_eb``; its third is the heading
-VEL     3     velocity over the ground, earth axes
-BIAS    3     gyro bias, body axes
-GAIN    3     relative gain error of each gyro axis
-FORCE   3     accelerometer bias, body axes
-LAG     3     velocity inside the receiver, behind its first-order filter, earth axes
-WIND    2     north and east velocity of the air
-======  ====  =====================================================================================
+=======  ====  =====================================================================================
+TILT     3     small rotation in earth axes, ``R_true = Exp(tilt) R_eb``; its third is the heading
+VEL      3     velocity over the ground, earth axes
+BIAS     3     gyro bias, body axes
+GAIN     3     relative gain error of each gyro axis
+FORCE    3     accelerometer bias, body axes
+LAG      3     velocity inside the receiver, behind its first-order filter, earth axes
+WIND     2     north and east velocity of the air
+LATENCY  1     from the moment a fix is true to its arrival
+=======  ====  =====================================================================================
 
 An attitude error in earth axes keeps the heading, which may be quite unknown, apart from the tilt, which is not.
 
@@ -31,12 +32,14 @@ from estimator.jit import kernel
 from estimator.kernels import clip
 from estimator.screening import G_M_S2
 
-N = 20
-TILT, VEL, BIAS, GAIN, FORCE, LAG, WIND_NE = 0, 3, 6, 9, 12, 15, 18
+N = 21
+TILT, VEL, BIAS, GAIN, FORCE, LAG, WIND_NE, LATENCY = 0, 3, 6, 9, 12, 15, 18, 20
 
 FULL = 0.97  # share of the full scale from which on a reading may be cut off
 CUT_RAD_S, CUT_M_S2, CUT_S = 1.0, 10.0, 0.1  # sigma and correlation time of what is then missing
 CROSS_S = 2.0  # how long an error that turns with the body keeps its direction: about a radian of turn
+FORCE_GAIN_SHARE = 0.5  # relative gain error of an accelerometer, of its bias sigma in g: pulling, it errs by more
+LATENCY_WALK_S_SQRT_S = 0.001  # a latency that is learnt may change: sigma after one second
 BIAS_LIMIT = 6.0  # no bias, gain or wind is believed beyond this many initial sigmas
 
 
@@ -99,8 +102,8 @@ def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
             s.R_filter_eb[i, j] = s.R_half[i, j]
     turn_in_body(s.R_filter_eb, x, y, z)
     # The receiver's filter, dy/dt = (v - y) / T, solved exactly for a velocity that is linear within the sample.
-    a, end = filter_weights(s.gps_filter_s, dt)
-    s.lag_keep, s.lag_end = a, end
+    keep, end = filter_weights(s.gps_filter_s, dt)
+    s.lag_keep, s.lag_end = keep, end
     for i in range(3):
         f = 0.0
         for j in range(3):
@@ -108,7 +111,7 @@ def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
         s.force_e[i] = f
         before = s.v_e_m_s[i]
         s.v_e_m_s[i] = before + dt * (f + G_M_S2 if i == 2 else f)
-        lagged = a * s.lagged_v_e_m_s[i] + (1.0 - a - end) * before + end * s.v_e_m_s[i]
+        lagged = keep * s.lagged_v_e_m_s[i] + (1.0 - keep - end) * before + end * s.v_e_m_s[i]
         s.lagged_rate_m_s2[i] = (lagged - s.lagged_v_e_m_s[i]) / dt
         s.lagged_v_e_m_s[i] = lagged
 
@@ -192,6 +195,9 @@ def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-de
     # An error with variance v and correlation time t acts, over longer times, as white noise of 2 v t.
     tilt = 0.5 * s.gyro_noise_rad_s_sqrt_hz**2 + 2.0 * CROSS_S * s.gyro_cross_axis**2 * squared
     velocity = 0.5 * s.force_noise_m_s2_sqrt_hz**2
+    f = s.force_e
+    pull = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2]) - G_M_S2
+    velocity += 2.0 * CROSS_S * (FORCE_GAIN_SHARE * s.force_bias_sigma_m_s2 / G_M_S2 * pull) ** 2
     if gyro_cut:
         tilt += 2.0 * CUT_S * CUT_RAD_S**2
     if force_cut:
@@ -200,6 +206,7 @@ def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-de
     grow(P, VEL, 3, velocity * dt, 1e6)
     grow(P, BIAS, 3, s.gyro_walk_rad_s_sqrt_s**2 * dt, s.gyro_bias_sigma_rad_s**2)
     grow(P, WIND_NE, 2, s.wind_walk_m_s_sqrt_s**2 * dt, s.wind_sigma_m_s**2)
+    grow(P, LATENCY, 1, LATENCY_WALK_S_SQRT_S**2 * dt, s.gps_latency_sigma_s**2)
 
 
 @kernel
@@ -219,7 +226,8 @@ def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    bool    False where the innovation is more than `gate` of its own sigmas, and nothing was changed
+    bool    False where the innovation is more than `gate` of its own sigmas, and nothing was changed; the variance
+            of the innovation is left in ``s.expected``
     """
     P, h, gain, left = s.P, s.h, s.gain, s.left
     expected = variance
@@ -231,6 +239,7 @@ def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
                 left[i] += P[j, i] * h[j]
     for i in range(N):
         expected += h[i] * left[i]
+    s.expected = expected
     if not innovation * innovation <= gate * gate * expected:  # written so that NaN is refused
         return False
     for i in range(N):
@@ -259,13 +268,14 @@ def correct_state(s, innovation):  # type: ignore[no-untyped-def]
     for i in range(3):
         s.v_e_m_s[i] += k[VEL + i] * innovation
         s.lagged_v_e_m_s[i] += k[LAG + i] * innovation
-        s.gyro_bias_b_rad_s[i] = within(
-            s.gyro_bias_b_rad_s[i] + k[BIAS + i] * innovation, 2.0 * s.gyro_bias_sigma_rad_s
-        )
+        calibrated = s.calibrated_bias_b_rad_s[i]
+        change = s.gyro_bias_b_rad_s[i] - calibrated + k[BIAS + i] * innovation
+        s.gyro_bias_b_rad_s[i] = calibrated + within(change, 2.0 * s.gyro_bias_sigma_rad_s)
         s.gyro_gain[i] = within(s.gyro_gain[i] + k[GAIN + i] * innovation, s.gyro_gain_sigma)
         s.force_bias_b_m_s2[i] = within(s.force_bias_b_m_s2[i] + k[FORCE + i] * innovation, s.force_bias_sigma_m_s2)
     for i in range(2):
         s.wind_e_m_s[i] = within(s.wind_e_m_s[i] + k[WIND_NE + i] * innovation, s.wind_sigma_m_s)
+    s.latency_s = clip(s.latency_s + k[LATENCY] * innovation, 0.0, s.longest_latency_s)
 
 
 @kernel

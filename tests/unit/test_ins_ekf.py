@@ -107,6 +107,124 @@ def test_delay_is_that_of_the_stamps_even_where_the_parameter_is_wrong():
     assert errors_deg(estimates[1500:], R_true[1500:])[0].max() <= 1.0
 
 
+@pytest.mark.parametrize("true_s", [0.1, 0.5, 0.8])
+@pytest.mark.parametrize("filter_s", [0.0, 1.0])
+def test_latency_of_unstamped_fixes_is_learnt_in_turns(true_s, filter_s):
+    """Assumed 0.3 +- 0.2 s, the latency of the receiver that made the rows is found to a sample, and reported."""
+    rows, R_true = coordinated(120.0, latency_s=true_s, filter_s=filter_s, stamped=False, rate_rad_s=0.5)
+    estimates, estimator = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.2, gps_filter_s=filter_s))
+    assert estimator.learnt.keys() == {"gps_latency_s"}
+    # The rows hold rates at the ends of ticks, not means over them: half a tick of 0.02 s.
+    assert estimator.learnt["gps_latency_s"] == pytest.approx(true_s, rel=0, abs=0.02)
+    assert estimator.sigma()["gps_latency_s"][0] < 0.02
+    assert errors_deg(estimates[4500:], R_true[4500:])[0].max() <= 1.0
+
+
+def test_latency_unstamped_by_nan_is_learnt_as_well():
+    """A stamp of NaN is none: the same latency is learnt as with stamps of another clock."""
+    rows, _ = coordinated(120.0, latency_s=0.5, stamped=False)
+    _, other_clock = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.2))
+    rows["gps_t_s"] = np.nan
+    _, unknown = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.2))
+    assert unknown.learnt == other_clock.learnt != {}
+
+
+@pytest.mark.parametrize(("stamped", "sigma_s"), [(True, 0.2), (False, 0.0)])
+def test_latency_that_is_known_is_not_learnt(stamped, sigma_s):
+    """With stamps, or with a sigma of zero, nothing is learnt, and the latency stays what it was."""
+    rows, _ = coordinated(latency_s=0.5, stamped=stamped)
+    _, estimator = replayed(rows, InsEkfParams(gps_latency_sigma_s=sigma_s))
+    assert estimator.learnt == {}
+    assert estimator.snapshot()["latency_s"][0] == 0.3
+    assert estimator.sigma()["gps_latency_s"][0] == pytest.approx(sigma_s, rel=0, abs=1e-12)
+
+
+def test_latency_in_straight_flight_is_not_learnt():
+    """Without acceleration a delay shows nowhere: the sigma stays, and nothing is reported."""
+    rows, _ = coordinated(latency_s=0.5, stamped=False, rate_rad_s=0.0)
+    _, estimator = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.15))
+    assert estimator.learnt == {}
+    assert estimator.sigma()["gps_latency_s"][0] > 0.1
+
+
+def test_vertical_velocity_that_is_not_reported_is_not_fused():
+    """Descending at 3 m/s with a receiver that reports zero for it: withheld, the tilt stays right; fused, it does not.
+
+    A descent that begins and ends: its vertical acceleration and the missing velocity contradict each other.
+    """
+    rows, R_true = coordinated(80.0, rate_rad_s=0.5)
+    t = rows["t_s"]
+    sinking = 0.5 * 2.0 * np.pi / 8.0 * 6.0 * np.cos(2.0 * np.pi * t / 8.0)  # of v_z = 3 sin: amplitude 3 m/s
+    rows["force_b_m_s2"] += R_true[:, 2, :] * sinking[:, None]
+    withheld, _ = replayed(rows, InsEkfParams(gps_vertical_velocity=False))
+    fused, estimator = replayed(rows)
+    tilt_withheld, tilt_fused = (errors_deg(e[2000:], R_true[2000:])[0].max() for e in (withheld, fused))
+    assert tilt_withheld <= 2.0
+    assert tilt_fused > 2.0 * tilt_withheld
+    rows["gps_v_e_m_s"][:, 2] = np.nan  # no receiver should: nobody looks at it
+    unread, _ = replayed(rows, InsEkfParams(gps_vertical_velocity=False))
+    np.testing.assert_array_equal(unread["R_eb"], withheld["R_eb"])
+
+
+def test_perfect_sensors_are_accepted_and_the_filter_stays_able_to_learn():
+    """Noise, biases and gains of zero, no full scale: P stays positive, and a tilt of 10 degrees still goes."""
+    perfect = InsEkfParams(
+        gyro_noise_rad_s_sqrt_hz=0.0, gyro_bias_sigma_rad_s=0.0, gyro_walk_rad_s_sqrt_s=0.0, gyro_gain_sigma=0.0,
+        gyro_cross_axis=0.0, gyro_full_scale_rad_s=math.inf, force_noise_m_s2_sqrt_hz=0.0, force_bias_sigma_m_s2=0.0,
+        force_full_scale_m_s2=math.inf, gps_noise_m_s=0.0, gps_filter_s=0.0, gps_latency_s=0.0,
+    )  # fmt: skip
+    rows, R_true = coordinated(filter_s=0.0, latency_s=0.0)
+    estimator = InsEkf(perfect)
+    estimator.reset()
+    estimator.replay(rows[:1500])
+    state = estimator.snapshot()
+    state["R_filter_eb"][0] = from_euler(math.radians(10.0), 0.0, 0.0) @ state["R_filter_eb"][0]
+    estimator.restore(state)
+    estimates = estimator.replay(rows[1500:])
+    P = estimator.snapshot()["P"][0, :20, :20]  # without the latency, which is exactly known
+    assert np.linalg.eigvalsh(P).min() > 0.0
+    assert errors_deg(estimates[1000:], R_true[2500:])[0].max() <= 1.0
+
+
+def test_gyro_bias_of_any_size_that_the_calibration_found_is_kept():
+    """A gyro that reads 20 deg/s too much, calibrated, and specified for 0.05 deg/s after that: it stays so in flight."""
+    rows, R_true = coordinated()
+    bias = np.radians([20.0, -15.0, 10.0])
+    rows["gyro_b_rad_s"] += bias
+    held = ImuSample(0.0, DT_S, bias, np.array([0.0, 0.0, -G]))
+    estimates, estimator = replayed(rows, InsEkfParams(gyro_bias_sigma_rad_s=math.radians(0.05)), held)
+    np.testing.assert_allclose(estimates["gyro_bias_b_rad_s"][-1], bias, rtol=0, atol=math.radians(0.1))
+    assert errors_deg(estimates[1500:], R_true[1500:])[0].max() <= 1.0
+    assert estimator.refused == {}
+
+
+def test_flight_that_begins_in_the_air_after_a_calibration_on_the_ground_finds_its_heading():
+    """Calibrated at rest, then at once at 13 m/s in a crosswind: the heading is the course to begin with, not chance."""
+    rows, R_true = coordinated(wind=(-2.0, 1.0))
+    held = ImuSample(0.0, DT_S, np.zeros(3), np.array([0.0, 0.0, -G]))
+    estimates, estimator = replayed(rows, None, held)
+    assert errors_deg(estimates[200:], R_true[200:])[1].max() <= 20.0  # the crab angle is 12 deg
+    assert errors_deg(estimates[1500:], R_true[1500:])[1].max() <= 2.0
+    assert estimator.refused == {}
+
+
+def test_receiver_noisier_than_assumed_is_given_less_weight():
+    """Five times the noise assumed: the tilt is at most twice that with the true figure, and fixes are accepted."""
+    rows, R_true = coordinated(120.0, rate_rad_s=0.5)
+    fixes = np.flatnonzero(rows["gps_new"])
+    rows["gps_v_e_m_s"][fixes] += 0.5 * np.random.default_rng(3).standard_normal((len(fixes), 3))
+    rms = []
+    for noise_m_s in (0.5, 0.1):
+        estimator = InsEkf(InsEkfParams(gps_noise_m_s=noise_m_s))
+        estimator.reset()
+        estimator.replay(rows[:2000])
+        rejected_at_first = estimator.rejected
+        estimates = estimator.replay(rows[2000:])
+        rms.append(float(np.sqrt(np.mean(errors_deg(estimates, R_true[2000:])[0] ** 2))))
+        assert estimator.rejected - rejected_at_first <= 0.02 * len(fixes)
+    assert rms[1] <= 2.0 * rms[0]  # 0.47 and 0.32 deg
+
+
 def test_outlier_is_refused_counted_and_harmless():
     """One fix that is 30 m/s off makes no difference but in the count and the health of its tick."""
     rows, _ = coordinated()
@@ -174,9 +292,30 @@ def test_magnetometer_finds_the_heading_at_rest_with_declination():
     rows["mag_new"][::5], rows["mag_b_ut"] = 1, R_true.T @ field_e
     held = ImuSample(0.0, DT_S, np.zeros(3), R_true[2] * -G)
     with_mag, _ = replayed(rows, InsEkfParams(use_magnetometer=True, declination_rad=declination), held)
+    rows["mag_new"] = 0
     without, _ = replayed(rows, None, held)
     assert abs(heading_error_rad(with_mag["R_eb"][-1], R_true)) <= math.radians(0.1)
     assert abs(heading_error_rad(without["R_eb"][-1], R_true)) > 1.0
+
+
+def test_uncalibrated_magnetometer_gives_the_first_heading_and_no_more():
+    """At rest the heading is the magnetometer's, and STARTING; in flight a field turned by 60 degrees changes nothing."""
+    heading = 2.0
+    R_rest = from_euler(0.1, -0.2, heading)
+    rest = np.zeros(200, MEASURED_DTYPE)
+    rest["t_s"], rest["dt_s"] = (np.arange(200) + 1) * DT_S, DT_S
+    rest["force_b_m_s2"] = R_rest[2] * -G
+    rest["mag_new"][::5], rest["mag_b_ut"] = 1, R_rest.T @ np.array([20.0, 0.0, 48.0])
+    held = ImuSample(0.0, DT_S, np.zeros(3), R_rest[2] * -G)
+    standing, _ = replayed(rest, None, held)
+    assert abs(heading_error_rad(standing["R_eb"][-1], R_rest)) <= math.radians(0.1)
+    assert set(standing["health"]) == {Health.STARTING}
+    rows, R_true = coordinated()
+    plain, _ = replayed(rows)
+    rows["mag_new"][::5], rows["mag_b_ut"] = 1, from_euler(0.0, 0.0, math.radians(60.0)) @ np.array([20.0, 0.0, 48.0])
+    turned, _ = replayed(rows)
+    with_mag, without = errors_deg(turned[500:], R_true[500:]), errors_deg(plain[500:], R_true[500:])
+    np.testing.assert_allclose(with_mag, without, rtol=0, atol=0.5)
 
 
 def test_airspeed_tells_the_wind_along_a_straight_flight():
@@ -256,7 +395,10 @@ def test_garbage_never_leaves_the_rotations(seed):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("gyro_noise_rad_s_sqrt_hz", 0.0),
+        ("gyro_noise_rad_s_sqrt_hz", -1e-3),
+        ("gyro_full_scale_rad_s", 0.0),
+        ("gps_latency_sigma_s", math.inf),
+        ("sideslip_sigma_m_s", 0.0),
         ("gps_noise_m_s", -1.0),
         ("wind_sigma_m_s", math.nan),
         ("gps_latency_s", 13.0),
