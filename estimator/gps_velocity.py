@@ -314,6 +314,16 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def turn_to_north(s, sine, cosine):  # type: ignore[no-untyped-def]
+    """Turn the heading at once by the angle of that sine and cosine: the first field is where it begins."""
+    for j in range(3):
+        x, y = s.R_eg[0, j], s.R_eg[1, j]
+        s.R_eg[0, j], s.R_eg[1, j] = cosine * x - sine * y, sine * x + cosine * y
+    s.yaw_applied_rad += np.arctan2(sine, cosine)
+    apply_corrections(s)
+
+
+@kernel
 def take_mag(row, s):  # type: ignore[no-untyped-def]
     """Turn the nose by what the horizontal field is off magnetic north."""
     if not take_field(row, s):
@@ -324,11 +334,15 @@ def take_mag(row, s):  # type: ignore[no-untyped-def]
         s.error_g[i] = s.R_gb[i, 0] * m[0] + s.R_gb[i, 1] * m[1] + s.R_gb[i, 2] * m[2]
     north, east, _ = to_earth(s, s.error_g)
     length, interval_s = np.hypot(north, east), s.clock_s - s.mag_t_s
-    s.mag_t_s = s.clock_s
-    if length > 0.0 and 0.0 < interval_s <= FIX_LIFE_S:
-        c, z = np.cos(s.declination_rad), np.sin(s.declination_rad)
-        sine, cosine = (north * z - east * c) / length, (north * c + east * z) / length
+    if not length > 0.0:
+        return
+    c, z = np.cos(s.declination_rad), np.sin(s.declination_rad)
+    sine, cosine = (north * z - east * c) / length, (north * c + east * z) / length
+    if s.mag_t_s == -np.inf:
+        turn_to_north(s, sine, cosine)
+    elif 0.0 < interval_s <= FIX_LIFE_S:
         correct_yaw(s, sine, cosine, 1.0, interval_s)
+    s.mag_t_s = s.clock_s
 
 
 @inlined

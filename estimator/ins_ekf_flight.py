@@ -44,6 +44,7 @@ STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the st
 FRAME_RAD = 0.01  # sigma of the heading before a match: none, in a frame of its own
 MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
 STANDING_M_S = 0.3  # sigma of a fix of exactly zero: some receivers report that at low speed (static navigation)
+TANGENT_SHARE = 0.5  # of the variance of the latency that a tangent leaves out: in a throw the rate changes within it
 SURPRISE_SHARE, MOST_SURPRISE = 0.1, 50.0  # weight of a fix in the mean, and the most that one can count
 CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR, STAMPED = 1, 2, 4, 8, 16, 32  # bits of a waiting sample
 
@@ -249,7 +250,8 @@ def believe_velocity(s, i, z, unsure):  # type: ignore[no-untyped-def]
         if not stamped:  # a latency longer by dL: the fix was true earlier, y(t - dL) = y - dL dy/dt
             innovation += (s.latency_s - s.w_fix_latency_s[i]) * rate
             s.h[LATENCY] = -rate if s.aligned else 0.0
-        variance = noise + more + (s.gps_lag_sigma_s * rate) ** 2
+        doubt = s.gps_lag_sigma_s**2 + (0.0 if stamped else TANGENT_SHARE * s.P[LATENCY, LATENCY])
+        variance = noise + more + doubt * rate * rate
         if j < 2:
             variance += unsure * unsure
         believed += fuse(s, innovation, variance, s.gate)

@@ -141,4 +141,4 @@ def test_errors_monte_carlo_are_small(flights):
     assert math.degrees(rms["heading"]) <= 3.2  # 1.69
     assert rms["velocity"] <= 0.3  # 0.15
     assert rms["wind"] <= 0.8  # 0.44
-    assert rms["latency"] <= 0.03  # XX, of 0.1 assumed
+    assert rms["latency"] <= 0.03  # 0.020, of 0.1 assumed

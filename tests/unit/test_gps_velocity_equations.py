@@ -79,6 +79,22 @@ def test_error_of_eqn_4_is_the_cross_product_of_both_sides():
     np.testing.assert_allclose(state["error_e"][0], oracle, rtol=0, atol=ROUND_OFF)
 
 
+def test_error_without_vertical_velocity_compares_the_horizontal_components_alone():
+    """Where it is not reported, the third component of a fix has no influence; the vertical is as felt."""
+    felt, dv = np.array([0.3, -0.2, 2.0]), np.array([0.1, 0.4, 0.0])
+    errors = []
+    for vertical in (0.0, 5.0, math.nan):
+        state = at_fix(np.eye(3), felt)
+        state["gps_vertical_velocity"] = 0
+        call_roll_pitch(state, dv + np.array([0.0, 0.0, vertical]))
+        errors.append(state["error_e"][0].copy())
+    right = np.array([-dv[0], -dv[1], felt[2]])
+    # Longer than half of gravity's over the interval, so that the lengths of both sides divide it.
+    oracle = np.cross(felt, right) / np.linalg.norm(felt) / np.linalg.norm(right)
+    for error in errors:
+        np.testing.assert_allclose(error, oracle, rtol=0, atol=ROUND_OFF)
+
+
 def test_error_in_free_fall_between_two_reports_is_zero():
     """Nothing is felt, and the velocity grows by gravity: both sides of Eqn 3 vanish, and divide nothing."""
     state = at_fix(Rotation.from_euler("x", 0.4).as_matrix(), np.zeros(3))

@@ -184,6 +184,17 @@ def test_magnetometer_turns_the_nose_to_true_north(declination_deg):
     assert np.degrees(inclination_error_rad(estimates["R_eb"], R))[-250:].max() < 0.1
 
 
+def test_magnetometer_the_first_field_is_the_heading_at_once():
+    """Powered up facing south, the heading is right a tick after the first field, though north was assumed."""
+    rows, R = turning(5.0, bank_deg=0.0, heading_0=3.0)
+    rows["mag_b_ut"] = np.einsum("nji,j->ni", R, [20.0, 0.0, 40.0])
+    rows["mag_new"][10::5] = 1
+    estimates = power_up(R[0], yaw_reference="magnetometer").replay(rows)
+    error_deg = np.degrees(np.abs(heading_error_rad(estimates["R_eb"], R)))
+    assert error_deg[10] > 170.0
+    assert error_deg[11:].max() < 0.1
+
+
 def test_gps_lost_the_paper_stands_in_and_health_is_poor():
     """In a turn, with the reports gone, the centrifugal term of the last airspeed keeps the tilt."""
     rows, R = turning(40.0)

@@ -157,7 +157,7 @@ def test_vertical_velocity_that_is_not_reported_is_not_fused():
     sinking = 0.5 * 2.0 * np.pi / 8.0 * 6.0 * np.cos(2.0 * np.pi * t / 8.0)  # of v_z = 3 sin: amplitude 3 m/s
     rows["force_b_m_s2"] += R_true[:, 2, :] * sinking[:, None]
     withheld, _ = replayed(rows, InsEkfParams(gps_vertical_velocity=False))
-    fused, estimator = replayed(rows)
+    fused, _ = replayed(rows)
     tilt_withheld, tilt_fused = (errors_deg(e[2000:], R_true[2000:])[0].max() for e in (withheld, fused))
     assert tilt_withheld <= 2.0
     assert tilt_fused > 2.0 * tilt_withheld
@@ -187,7 +187,7 @@ def test_perfect_sensors_are_accepted_and_the_filter_stays_able_to_learn():
 
 
 def test_gyro_bias_of_any_size_that_the_calibration_found_is_kept():
-    """A gyro that reads 20 deg/s too much, calibrated, and specified for 0.05 deg/s after that: it stays so in flight."""
+    """A gyro that reads 20 deg/s too much, calibrated, and specified for 0.05 deg/s after that: it stays so."""
     rows, R_true = coordinated()
     bias = np.radians([20.0, -15.0, 10.0])
     rows["gyro_b_rad_s"] += bias
@@ -199,7 +199,7 @@ def test_gyro_bias_of_any_size_that_the_calibration_found_is_kept():
 
 
 def test_flight_that_begins_in_the_air_after_a_calibration_on_the_ground_finds_its_heading():
-    """Calibrated at rest, then at once at 13 m/s in a crosswind: the heading is the course to begin with, not chance."""
+    """Calibrated at rest, then at once at 13 m/s in a crosswind: the heading is the course to begin with."""
     rows, R_true = coordinated(wind=(-2.0, 1.0))
     held = ImuSample(0.0, DT_S, np.zeros(3), np.array([0.0, 0.0, -G]))
     estimates, estimator = replayed(rows, None, held)
@@ -299,7 +299,7 @@ def test_magnetometer_finds_the_heading_at_rest_with_declination():
 
 
 def test_uncalibrated_magnetometer_gives_the_first_heading_and_no_more():
-    """At rest the heading is the magnetometer's, and STARTING; in flight a field turned by 60 degrees changes nothing."""
+    """At rest the heading is the magnetometer's, and STARTING; in flight one turned by 60 degrees changes nothing."""
     heading = 2.0
     R_rest = from_euler(0.1, -0.2, heading)
     rest = np.zeros(200, MEASURED_DTYPE)
