@@ -87,15 +87,15 @@ from estimator.ins_ekf_kernels import (
 from estimator.ins_ekf_params import FLOORS, InsEkfParams
 from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.jit import kernel
+from estimator.magnetometer import FIELD, take_field, write_calibration
 from estimator.rotation import level, renormalise
 from estimator.screening import (
-    AIR,
     FORCE_GOOD,
     G_M_S2,
     GPS,
     GYRO_GOOD,
-    MAG,
     SCREEN,
+    airspeed_came,
     attitude_at_rest,
     offset_at_rest,
     refuse,
@@ -113,7 +113,7 @@ GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigma
 _PARAMS = tuple(
     Column(f.name, (), "see InsEkfParams", integer=isinstance(f.default, bool))
     for f in fields(InsEkfParams)
-    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
+    if f.name not in ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut", "calibration")  # of SCREEN and FIELD
 )
 _FILTER = (
     Column("R_filter_eb", (3, 3), "attitude at the filter's time"),
@@ -147,6 +147,7 @@ _AROUND = (
     Column("mag_started", (), "1 once an uncalibrated magnetometer gave a first heading", integer=True),
     Column("unstamped", (), "how many fixes without a stamp came", integer=True),
     Column("pseudo_s", (), "time since the last pseudo-measurements"),
+    Column("air_age_s", (), "infinite before the first airspeed, else 0"),
     Column("cruise_m_s", (), "airspeed of late, for when the GPS falls silent"),
     Column("cruise_sigma_m_s", (), "how well it is known"),
     Column("lift_e_m_s2", (), "mean downward specific force of late: minus gravity, in any flight"),
@@ -164,7 +165,7 @@ _AROUND = (
     Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
     Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
 )
-STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + _PARAMS + _FILTER + _AROUND)
+STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + FIELD + _PARAMS + _FILTER + _AROUND)
 
 
 # What waits
@@ -230,20 +231,15 @@ def attach_fix(row, s):  # type: ignore[no-untyped-def]
 def attach_others(row, s):  # type: ignore[no-untyped-def]
     """Put magnetometer and air data of `row` beside the newest sample."""
     i = (s.oldest + s.waiting - 1) % SIZE
-    if row.mag_new and (s.use_magnetometer or not (s.mag_started or s.aligned)):
-        m = row.mag_b_ut
-        if abs(m[0]) < 1e4 and abs(m[1]) < 1e4 and abs(m[2]) < 1e4:
-            s.w_bits[i] |= HAS_MAG
-            for j in range(3):
-                s.w_mag_b_ut[i, j] = m[j]
-        else:
-            refuse(s, MAG)
-    if row.air_new and s.use_airspeed:
-        if abs(row.airspeed_m_s) < 1000.0:  # a pitot tube at rest reads a little below zero
-            s.w_bits[i] |= HAS_AIR
-            s.w_airspeed_m_s[i] = max(row.airspeed_m_s, 0.0)
-        else:
-            refuse(s, AIR)
+    wanted = s.use_magnetometer and (s.magnetometer_calibrated or not (s.mag_started or s.aligned))
+    if wanted and take_field(row, s):
+        s.w_bits[i] |= HAS_MAG
+        for j in range(3):
+            s.w_mag_b_ut[i, j] = s.field_b_ut[j]
+    if s.use_airspeed and airspeed_came(row, s):
+        s.air_age_s = 0.0
+        s.w_bits[i] |= HAS_AIR
+        s.w_airspeed_m_s[i] = max(row.airspeed_m_s, 0.0)
 
 
 # The present
@@ -343,7 +339,10 @@ class InsEkf(Compiled):
         s = self._state[0]
         self._state.fill(0)
         for f in fields(self.params):
-            s[f.name] = max(getattr(self.params, f.name), FLOORS.get(f.name, -math.inf))
+            if f.name != "calibration":
+                s[f.name] = max(getattr(self.params, f.name), FLOORS.get(f.name, -math.inf))
+        write_calibration(self._state, self.params.calibration)
+        s["air_age_s"] = math.inf
         s["delay_s"] = s["latency_s"] = self.params.gps_latency_s
         s["longest_latency_s"] = self.params.longest_latency_s
         s["lift_e_m_s2"] = -G_M_S2

@@ -278,7 +278,7 @@ def take_mag(s, i):  # type: ignore[no-untyped-def]
     the frame of unknown heading points until a moving fix comes.
     """
     innovation = wrap(s.declination_rad - magnetic_course(s, s.w_mag_b_ut[i]))
-    if not s.use_magnetometer:
+    if not s.magnetometer_calibrated:
         if not s.aligned:
             turn_heading(s, innovation)
         s.mag_started = 1

@@ -7,8 +7,9 @@ ever, and would not cover what 50 samples a second leave out (a rate or force th
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
+from estimator.magnetometer import FIELD_RANGE_UT, Calibration
 from estimator.screening import FORCE_RANGE_M_S2, G_M_S2, GYRO_RANGE_RAD_S
 
 LONGEST_LATENCY_S = 12.5
@@ -57,13 +58,15 @@ class InsEkfParams:
     incidence_sigma_m_s : float         of that along the body's z axis, likewise; used without vertical velocity
     use_airspeed : bool                 use airspeeds where they come
     airspeed_noise_m_s : float          sigma of an airspeed
-    use_magnetometer : bool             use the magnetometer's heading where it comes (calibrated, that is); otherwise
-                                        it gives the heading before the first moving fix alone
+    use_magnetometer : bool             use the magnetometer where its samples come: one that is calibrated for the
+                                        heading, any other for the heading before the first moving fix alone
+    magnetometer_calibrated : bool      whether its readings are free of iron, by nature or by `calibration`
+    calibration                         of the magnetometer
     declination_rad : float             magnetic north from true north, positive to the east
     magnetic_noise_rad : float          sigma of a magnetic heading
     min_speed_m_s : float               slowest ground speed that starts the heading
     gate : float                        innovations beyond so many sigmas are rejected
-    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
+    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
     """
 
     gyro_noise_rad_s_sqrt_hz: float = math.radians(0.07)
@@ -88,7 +91,10 @@ class InsEkfParams:
     incidence_sigma_m_s: float = 3.0
     use_airspeed: bool = True
     airspeed_noise_m_s: float = 1.0
-    use_magnetometer: bool = False
+    use_magnetometer: bool = True
+    magnetometer_calibrated: bool = False
+    calibration: Calibration = field(default_factory=Calibration)
+    field_range_ut: float = FIELD_RANGE_UT
     declination_rad: float = 0.0
     magnetic_noise_rad: float = math.radians(5.0)
     min_speed_m_s: float = 3.0
@@ -99,7 +105,7 @@ class InsEkfParams:
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            if isinstance(f.default, bool):
+            if isinstance(f.default, bool) or f.name == "calibration":
                 continue
             if f.name == "declination_rad":
                 if not abs(value) <= math.pi:
@@ -110,7 +116,7 @@ class InsEkfParams:
             elif not 0.0 <= value < math.inf or (value == 0.0 and f.name not in _MAY_BE_ZERO):
                 least = "zero or more" if f.name in _MAY_BE_ZERO else "more than zero"
                 raise ValueError(f"{f.name} is {value}; it must be a finite number, {least}")
-        for name in ("gyro_range_rad_s", "force_range_m_s2"):
+        for name in ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut"):
             if getattr(self, name) > 1e4:
                 raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
         if self.gps_latency_s > LONGEST_LATENCY_S:

@@ -39,7 +39,8 @@ def made(request):
     if hasattr(params, "use_magnetometer"):
         from dataclasses import replace
 
-        estimator = make(replace(params, use_magnetometer=True))
+        calibrated = {"magnetometer_calibrated": True} if hasattr(params, "magnetometer_calibrated") else {}
+        estimator = make(replace(params, use_magnetometer=True, **calibrated))
     return estimator
 
 

@@ -33,7 +33,7 @@ def class_of(name):
     return getattr(importlib.import_module(module), attribute)
 
 
-IN_THE_PAST = {"gps_velocity_magnetometer", "ins_ekf"}  # correct what they believed earlier: tests of their own
+IN_THE_PAST = {"ins_ekf"}  # corrects what it estimated earlier: tests of its own
 MAGNETIC = [n for n in package.ESTIMATORS if "magnetometer" in class_of(n).uses and n not in IN_THE_PAST]
 
 
@@ -64,8 +64,11 @@ def flown(estimator, rows):
 
 
 def settled(name):
-    """The row from which on the heading is there: VQF is told the magnetometer's interval by the second field."""
-    return FIRST + EVERY if name == "peer_vqf" else FIRST
+    """The row from which on the heading is there.
+
+    VQF is told the magnetometer's interval by the second field; `gps_velocity` corrects with the sample that follows.
+    """
+    return FIRST + {"peer_vqf": EVERY, "gps_velocity_magnetometer": 1}.get(name, 0)
 
 
 @pytest.mark.parametrize("heading_deg", HEADINGS_DEG)

@@ -291,7 +291,7 @@ def test_magnetometer_finds_the_heading_at_rest_with_declination():
     field_e = 20.0 * np.array([math.cos(declination), math.sin(declination), 2.4])
     rows["mag_new"][::5], rows["mag_b_ut"] = 1, R_true.T @ field_e
     held = ImuSample(0.0, DT_S, np.zeros(3), R_true[2] * -G)
-    with_mag, _ = replayed(rows, InsEkfParams(use_magnetometer=True, declination_rad=declination), held)
+    with_mag, _ = replayed(rows, InsEkfParams(magnetometer_calibrated=True, declination_rad=declination), held)
     rows["mag_new"] = 0
     without, _ = replayed(rows, None, held)
     assert abs(heading_error_rad(with_mag["R_eb"][-1], R_true)) <= math.radians(0.1)
@@ -383,7 +383,7 @@ def test_garbage_never_leaves_the_rotations(seed):
     rows["airspeed_m_s"] = rng.choice([13.0, np.nan, -5.0, 1e6, 900.0], n)
     for name in ("gps_new", "mag_new", "air_new"):
         rows[name] = rng.random(n) < 0.3
-    estimates, estimator = replayed(rows, InsEkfParams(use_magnetometer=True))
+    estimates, estimator = replayed(rows, InsEkfParams(magnetometer_calibrated=True))
     R = estimates["R_eb"]
     assert np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max() < 1e-6
     assert np.linalg.det(R).min() > 0.0
