@@ -12,6 +12,7 @@ from estimator.ins_ekf_kernels import (
     FORCE,
     GAIN,
     LAG,
+    LATENCY,
     TILT,
     VEL,
     WIND_NE,
@@ -36,6 +37,7 @@ VECTORS = (
     ("force_bias_b_m_s2", FORCE, 3),
     ("lagged_v_e_m_s", LAG, 3),
     ("wind_e_m_s", WIND_NE, 2),
+    ("latency_s", LATENCY, 1),
 )
 
 
@@ -48,32 +50,35 @@ def some_state(seed=3):
     s["v_e_m_s"], s["lagged_v_e_m_s"] = [9.0, -8.0, 1.0], [10.0, -5.0, 0.5]
     s["gyro_bias_b_rad_s"], s["force_bias_b_m_s2"] = rng.normal(0.0, 0.01, 3), rng.normal(0.0, 0.1, 3)
     s["gyro_gain"], s["wind_e_m_s"][:2] = rng.normal(0.0, 0.01, 3), [2.0, -3.0]
+    s["latency_s"] = 0.5
     A = rng.normal(0.0, 0.1, (N, N))
     s["P"] = A @ A.T
     return state
 
 
 def moved(state, error):
-    """The state that is true where `state` is the estimate and `error`, shape (20,), its error: a new record."""
+    """The state that is true where `state` is the estimate and `error`, shape (N,), its error: a new record."""
     out = state.copy()
     s = out[0]
     s["R_filter_eb"] = Rotation.from_rotvec(error[:3]).as_matrix() @ s["R_filter_eb"]
     for name, first, count in VECTORS:
-        s[name][:count] += error[first : first + count]
+        value = np.array(s[name])
+        value.reshape(-1)[:count] += error[first : first + count]
+        s[name] = value
     return out
 
 
 def difference(true, estimate):
-    """The error of `estimate` against `true`, shape (20,): the inverse of `moved`."""
+    """The error of `estimate` against `true`, shape (N,): the inverse of `moved`."""
     t, e, error = true[0], estimate[0], np.zeros(N)
     error[:3] = Rotation.from_matrix(t["R_filter_eb"] @ e["R_filter_eb"].T).as_rotvec()
     for name, first, count in VECTORS:
-        error[first : first + count] = t[name][:count] - e[name][:count]
+        error[first : first + count] = np.atleast_1d(t[name])[:count] - np.atleast_1d(e[name])[:count]
     return error
 
 
 def numerical_transition(state, dt_s, h=1e-5):
-    """Central differences of the nonlinear step, (20, 20); good to h^2."""
+    """Central differences of the nonlinear step, (N, N); good to h^2."""
     columns = []
     middle = state.copy()
     advance_state(middle[0], GYRO, FORCE_B, dt_s)
@@ -88,7 +93,7 @@ def numerical_transition(state, dt_s, h=1e-5):
 
 
 def transition(state, dt_s):
-    """F of the kernel, (20, 20), and the state after the step."""
+    """F of the kernel, (N, N), and the state after the step."""
     after = state.copy()
     advance_state(after[0], GYRO, FORCE_B, dt_s)
     F = np.eye(N)
@@ -139,9 +144,15 @@ def test_predict_equals_a_plain_kalman_filter():
     rate = after["rate_b"][0]
     Q = np.zeros(N)
     Q[TILT : TILT + 3] = params.gyro_noise_rad_s_sqrt_hz**2 / 2.0 + 4.0 * params.gyro_cross_axis**2 * rate @ rate
-    Q[VEL : VEL + 3] = params.force_noise_m_s2_sqrt_hz**2 / 2.0
-    Q[WIND_NE:] = params.wind_walk_m_s_sqrt_s**2
-    expected = F @ state["P"][0] @ F.T + np.diag(Q) * dt_s  # the biases are at their limit: no more noise
+    # An accelerometer that pulls beyond 1 g errs by half its bias sigma for each g, for 2 s in one direction.
+    pull_g = np.linalg.norm(FORCE_B - state["force_bias_b_m_s2"][0]) / 9.80665 - 1.0
+    Q[VEL : VEL + 3] = (
+        params.force_noise_m_s2_sqrt_hz**2 / 2.0 + 4.0 * (0.5 * params.force_bias_sigma_m_s2 * pull_g) ** 2
+    )
+    Q[WIND_NE : WIND_NE + 2] = params.wind_walk_m_s_sqrt_s**2
+    expected = (
+        F @ state["P"][0] @ F.T + np.diag(Q) * dt_s
+    )  # the biases and the latency are at their limit: no more noise
     predict(state[0], GYRO, FORCE_B, dt_s, 0, 0)
     np.testing.assert_allclose(state["P"][0], expected, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(state["P"][0], state["P"][0].T)
@@ -219,7 +230,7 @@ def test_turns_equal_scipy(angle):
 
 
 def test_state_record_has_every_part_of_the_error():
-    """The parts fill the twenty states without gap or overlap."""
+    """The parts fill the states without gap or overlap."""
     order = sorted([(TILT, 3), *((first, count) for _, first, count in VECTORS)])
     assert [first for first, _ in order] == [sum(c for _, c in order[:i]) for i in range(len(order))]
     assert sum(count for _, count in order) == N == STATE_DTYPE["P"].shape[0]
