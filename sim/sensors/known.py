@@ -10,6 +10,7 @@ from estimator.instruments import Known
 from sim.clock import Rates
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.board import BoardParams
+from sim.sensors.device import converter, noise_filter, noise_of_one_conversion
 from sim.sensors.fitting import SuiteParams
 from sim.sensors.gps import KNOT_M_S, GpsParams
 from sim.sensors.gyro import GyroParams
@@ -52,49 +53,68 @@ def _receiver(gps: GpsParams, rates: Rates) -> dict[str, float | bool]:
     """
     from_positions = gps.course == "positions"
     step_m_s = {"none": 0.0, "nmea": NMEA_SPEED_STEP_M_S, "binary": UBX_SPEED_STEP_M_S}[gps.resolution]
+    noise_m_s = math.hypot(gps.velocity_noise_m_s, gps.velocity_wander_m_s, step_m_s / UNIFORM)
+    if from_positions:  # the difference of two positions, two intervals apart
+        noise_m_s = gps.noise_horizontal_m * math.sqrt(2.0) * rates.gps_hz / 2.0
     return {
         "gps_filter_s": gps.filter_s + gps.smoothing_s,
         "gps_latency_s": gps.latency_s + (1.0 / rates.gps_hz if from_positions else 0.0),
         "gps_stamped": not from_positions,
-        "gps_vertical_velocity": gps.resolution != "nmea",
+        "gps_vertical_velocity": from_positions or gps.resolution != "nmea",
         "gps_rate_hz": float(rates.gps_hz),
-        "gps_noise_m_s": math.hypot(gps.velocity_noise_m_s, gps.velocity_wander_m_s, step_m_s / UNIFORM),
+        "gps_noise_m_s": noise_m_s,
     }
 
 
 def _gyro(gyro: GyroParams, board: BoardParams, rates: Rates) -> dict[str, float]:
-    dt_s = rates.dt_s
-    step_deg_s = _step(gyro.range_deg_s, gyro.step_deg_s, gyro.bits)
-    noise = math.hypot(gyro.noise_density_deg_s_sqrt_hz, _density(step_deg_s / UNIFORM, dt_s))
+    """The gyro: a calibration at rest removes the bias at power-up, and not what comes later.
+
+    Crooked mounting is to a filter what the part's own cross-axis sensitivity is.
+    """
+    noise = _density(gyro, gyro.noise_density_deg_s_sqrt_hz, gyro.step_deg_s, gyro.range_deg_s, rates)
     at_power_up_deg_s = 0.0 if board.rest_s > 0.0 else gyro.bias_deg_s
-    later_deg_s = gyro.bias_per_k_deg_s * board.warming_k, gyro.bias_instability_deg_s, gyro.g_sensitivity_deg_s_g
+    later_deg_s = (
+        gyro.bias_per_k_deg_s * board.warming_k, 2.0 * gyro.bias_instability_deg_s, gyro.drift_deg_s_min,
+        gyro.g_sensitivity_deg_s_g, _analogue(gyro.output, gyro.null_deg_s * board.supply_sag),
+    )  # fmt: skip
+    gains = gyro.gain, gyro.gain_per_k * board.warming_k, gyro.nonlinearity
     return {
         "gyro_full_scale_rad_s": math.radians(gyro.range_deg_s),
         "gyro_noise_rad_s_sqrt_hz": math.radians(noise),
         "gyro_bias_sigma_rad_s": math.radians(math.hypot(at_power_up_deg_s, *later_deg_s)),
-        "gyro_gain_sigma": math.hypot(gyro.gain, gyro.gain_per_k * board.warming_k),
-        "gyro_cross_axis": gyro.cross_axis,
+        "gyro_gain_sigma": math.hypot(*gains, _analogue(gyro.output, board.supply_tolerance)),
+        "gyro_cross_axis": math.hypot(gyro.cross_axis, _mounting_rad(board)),
     }
 
 
 def _accelerometer(part: AccelerometerParams, board: BoardParams, rates: Rates) -> dict[str, float]:
-    step_g = _step(part.range_g, part.step_g, part.bits)
-    noise_g = math.hypot(1e-6 * part.noise_density_ug_sqrt_hz, _density(step_g / UNIFORM, rates.dt_s))
-    bias_g = math.hypot(part.bias_g, 1e-3 * part.bias_per_k_mg * board.warming_k, 1e-6 * part.bias_instability_ug)
+    """The accelerometer: in steady flight gain, cross axes and mounting act on 1 g, and look like a bias."""
+    noise = _density(part, 1e-6 * part.noise_density_ug_sqrt_hz, part.step_g, part.range_g, rates)
+    biases_g = part.bias_g, 1e-3 * part.bias_per_k_mg * board.warming_k, part.gain, part.cross_axis
     return {
         "force_full_scale_m_s2": part.range_g * STANDARD_GRAVITY_M_S2,
-        "force_noise_m_s2_sqrt_hz": noise_g * STANDARD_GRAVITY_M_S2,
-        "force_bias_sigma_m_s2": bias_g * STANDARD_GRAVITY_M_S2,
+        "force_noise_m_s2_sqrt_hz": noise * STANDARD_GRAVITY_M_S2,
+        "force_bias_sigma_m_s2": math.hypot(*biases_g, _mounting_rad(board)) * STANDARD_GRAVITY_M_S2,
     }
 
 
-def _step(full_scale: float, step: float, bits: int) -> float:
-    """One step of the converter; 0 where it has none."""
-    if step > 0.0 or not bits:
-        return step
-    return 2.0 * full_scale / 2.0**bits
+def _mounting_rad(board: BoardParams) -> float:
+    return math.radians(max(map(abs, board.mounting_deg)))
 
 
-def _density(sigma: float, dt_s: float) -> float:
-    """One-sided density of a white noise with the standard deviation `sigma` in every sample of `dt_s` s."""
-    return sigma * math.sqrt(2.0 * dt_s)
+def _analogue(output: str, figure: float) -> float:
+    """A figure that counts for parts with an analogue output alone: what the supply does to them."""
+    return 0.0 if output == "digital" else figure
+
+
+def _density(
+    part: GyroParams | AccelerometerParams, density_sqrt_hz: float, step: float, full_scale: float, rates: Rates
+) -> float:
+    """One-sided noise density of the samples: that of the part, of what folds down from above, and of its converter.
+
+    A white noise with the standard deviation sigma in every sample of dt has the density sigma sqrt(2 dt).
+    """
+    _, folded = noise_filter(part.bandwidth_hz, part.conversions, rates.imu_hz)
+    of_one = noise_of_one_conversion(density_sqrt_hz, part.bandwidth_hz, part.conversions, rates.imu_hz)
+    one_step, _, _ = converter(step, full_scale, part.bits, part.conversions, of_one)
+    return math.hypot(folded * density_sqrt_hz, one_step / UNIFORM * math.sqrt(2.0 * rates.dt_s))
