@@ -110,7 +110,7 @@ class GpsVelocityParams:
     k_i: float = 0.03
     offset_limit_rad_s: float = math.radians(6.0)
     integrate_below_rad_s: float = math.radians(60.0)
-    gps_filter_s: float = 1.0
+    gps_filter_s: float = 0.0
     gps_latency_s: float = 0.3
     gps_vertical_velocity: bool = True
     launch_gate: float = 0.2

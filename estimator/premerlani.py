@@ -134,7 +134,7 @@ class PremerlaniParams:
     offset_limit_rad_s: float = math.radians(6.0)
     integrate_below_rad_s: float = math.radians(20.0)
     gps_lag_filter: bool = True
-    gps_filter_s: float = 1.0
+    gps_filter_s: float = 0.0
     gps_latency_s: float = 0.3
     rotate_history: bool = True
     launch_gate: float = 0.2
