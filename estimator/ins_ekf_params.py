@@ -31,7 +31,9 @@ FLOORS: Mapping[str, float] = {
 
 @dataclass(frozen=True, slots=True)
 class InsEkfParams:
-    """What the filter assumes of its sensors and of the air; the defaults are the generic sensors.
+    """What the filter assumes of its sensors and of the air.
+
+    The defaults are what is assumed where nothing is known, see `estimator.instruments`.
 
     A sigma that is too small makes the estimate overconfident and slow to recover; one that is too large makes it
     noisy and slow to learn.  Sigmas of sensors may be zero, full scales infinite: see `FLOORS`.
