@@ -177,8 +177,9 @@ def test_perfect_sensors_are_accepted_and_the_filter_stays_able_to_learn():
     """Noise, biases and gains of zero, no full scale: P stays positive, and a tilt of 10 degrees still goes."""
     perfect = replace(
         GENERIC, gyro_noise_rad_s_sqrt_hz=0.0, gyro_bias_sigma_rad_s=0.0, gyro_walk_rad_s_sqrt_s=0.0,
-        gyro_gain_sigma=0.0, gyro_cross_axis=0.0, gyro_full_scale_rad_s=math.inf, force_noise_m_s2_sqrt_hz=0.0, force_bias_sigma_m_s2=0.0,
-        force_full_scale_m_s2=math.inf, gps_noise_m_s=0.0, gps_filter_s=0.0, gps_latency_s=0.0,
+        gyro_gain_sigma=0.0, gyro_cross_axis=0.0, gyro_full_scale_rad_s=math.inf, force_noise_m_s2_sqrt_hz=0.0,
+        force_bias_sigma_m_s2=0.0, force_full_scale_m_s2=math.inf, gps_noise_m_s=0.0, gps_filter_s=0.0,
+        gps_latency_s=0.0,
     )  # fmt: skip
     rows, R_true = coordinated(filter_s=0.0, latency_s=0.0)
     estimator = InsEkf(perfect)
