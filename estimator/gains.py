@@ -83,7 +83,7 @@ def recommended_gains(
     remaining : part of the disturbance, 0..1
     damping : of the roll-pitch loop.  Large: little overshoot and little noise in the learnt offset, which then
         takes its time; from 1.4 on, the overshoot stays below a tenth
-    base : where all other parameters, K_P too, come from; the defaults by default
+    base : where all other parameters come from, K_P and the lag of the receiver too; the defaults by default
 
     Returns
     -------

@@ -82,7 +82,7 @@ YawReference = Literal["course", "nose", "magnetometer"]
 
 @dataclass(frozen=True, slots=True)
 class GpsVelocityParams:
-    """Gains and options.
+    """Gains and options; the receiver by default is what is assumed where nothing is known: `estimator.instruments`.
 
     yaw_reference : str        what the heading converges to: "course", "nose" or "magnetometer"
     w_rp, w_y : float          weights of the roll-pitch and the yaw error (Eqn 28 of the paper).  Large: errors go
@@ -91,7 +91,7 @@ class GpsVelocityParams:
     k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
     offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
     integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
-    gps_filter_s : float       time constant of the receiver's velocity filter
+    gps_filter_s : float       time constant of the receiver's velocity filter; 0 is none
     gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
     gps_vertical_velocity : bool   False: the receiver reports no vertical velocity; Eqn 4 then compares the horizontal
                                components alone
@@ -110,7 +110,7 @@ class GpsVelocityParams:
     k_i: float = 0.03
     offset_limit_rad_s: float = math.radians(6.0)
     integrate_below_rad_s: float = math.radians(60.0)
-    gps_filter_s: float = 1.0
+    gps_filter_s: float = 0.0
     gps_latency_s: float = 0.3
     gps_vertical_velocity: bool = True
     launch_gate: float = 0.2

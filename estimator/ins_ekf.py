@@ -318,7 +318,7 @@ class InsEkf(Compiled):
 
     Parameters
     ----------
-    params : what it believes of its sensors; the defaults are the generic ones
+    params : what it believes of its sensors; the defaults are what is assumed where nothing is known
     """
 
     heading_reference: HeadingReference = "nose"

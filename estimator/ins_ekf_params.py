@@ -31,7 +31,9 @@ FLOORS: Mapping[str, float] = {
 
 @dataclass(frozen=True, slots=True)
 class InsEkfParams:
-    """What the filter assumes of its sensors and of the air; the defaults are the generic sensors.
+    """What the filter assumes of its sensors and of the air.
+
+    The defaults are what is assumed where nothing is known, see `estimator.instruments`.
 
     A sigma that is too small makes the estimate overconfident and slow to recover; one that is too large makes it
     noisy and slow to learn.  Sigmas of sensors may be zero, full scales infinite: see `FLOORS`.
@@ -74,14 +76,14 @@ class InsEkfParams:
     gyro_walk_rad_s_sqrt_s: float = math.radians(0.02)
     gyro_gain_sigma: float = 0.015
     gyro_cross_axis: float = 0.005
-    gyro_full_scale_rad_s: float = math.radians(300.0)
+    gyro_full_scale_rad_s: float = math.radians(2000.0)
     force_noise_m_s2_sqrt_hz: float = 0.004 * G_M_S2
     force_bias_sigma_m_s2: float = 0.02 * G_M_S2
-    force_full_scale_m_s2: float = 3.0 * G_M_S2
+    force_full_scale_m_s2: float = 16.0 * G_M_S2
     gps_noise_m_s: float = 0.1
-    gps_filter_s: float = 1.0
+    gps_filter_s: float = 0.0
     gps_latency_s: float = 0.3
-    gps_latency_sigma_s: float = 0.0
+    gps_latency_sigma_s: float = 0.15
     gps_stamped: bool = True
     gps_vertical_velocity: bool = True
     gps_lag_sigma_s: float = 0.02

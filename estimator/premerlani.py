@@ -103,6 +103,8 @@ CLIPPED = 0.99  # of the full scale: the largest count of 8 bits is 0.992 of it
 class PremerlaniParams:
     """Gains and options; `estimator.gains.recommended_gains` works gains out from a time of recovery.
 
+    The receiver by default is what is assumed where nothing is known, see `estimator.instruments`.
+
     w_rp, w_y : float          weights of the roll-pitch and the yaw correction, Eqn 28.  Large: errors go quickly,
                                but accelerations and wind get in
     w_y_until_lock : float     weight of the yaw correction until yaw is locked, where that is more than `w_y`
@@ -110,7 +112,7 @@ class PremerlaniParams:
     offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
     integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
     gps_lag_filter : bool      compare the course with an equally late nose, restore the speed
-    gps_filter_s : float       time constant of the receiver's velocity filter
+    gps_filter_s : float       time constant of the receiver's velocity filter; 0 is none
     gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
     rotate_history : bool      take the receiver's lag out of the yaw loop
     launch_gate : float        no roll-pitch correction while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
@@ -134,7 +136,7 @@ class PremerlaniParams:
     offset_limit_rad_s: float = math.radians(6.0)
     integrate_below_rad_s: float = math.radians(20.0)
     gps_lag_filter: bool = True
-    gps_filter_s: float = 1.0
+    gps_filter_s: float = 0.0
     gps_latency_s: float = 0.3
     rotate_history: bool = True
     launch_gate: float = 0.2

@@ -25,17 +25,25 @@ from sim.sensors.suite import Suite
 
 IMU_HZ = 50
 STEP_S = 1.0 / IMU_HZ
-# Perfect sensors but for the lag that every receiver has: a 1 s filter and 0.3 s of latency, at 4 Hz.
-LAGGED: Mapping[str, Any] = MappingProxyType({"gps.filter_s": 1.0, "gps.latency_s": 0.3})
+# Perfect sensors but for the lag of the receiver, as in the generic suite: a 1 s filter and 0.3 s of latency, at 4 Hz.
+FILTER_S, LATENCY_S = 1.0, 0.3
+LAGGED: Mapping[str, Any] = MappingProxyType({"gps.filter_s": FILTER_S, "gps.latency_s": LATENCY_S})
+# That receiver, as parameters of an estimator.
+RECEIVER: Mapping[str, Any] = MappingProxyType({"gps_filter_s": FILTER_S, "gps_latency_s": LATENCY_S})
 # Of `premerlani`, what the paper's own text has: neither its gates nor what it learns of clipping and turning.
 AS_PRINTED: Mapping[str, Any] = MappingProxyType(
     {"launch_gate": math.inf, "integrate_below_rad_s": math.inf, "use_airspeed": False}
 )
 
 
+def aboard(**params: Any) -> PremerlaniParams:
+    """Parameters of `premerlani` that know the receiver."""
+    return PremerlaniParams(**{**RECEIVER, **params})
+
+
 def printed(**params: Any) -> PremerlaniParams:
     """Parameters of `premerlani` without what goes beyond the paper's text, but for the GPS-lag filter it names."""
-    return PremerlaniParams(**{**AS_PRINTED, **params})
+    return aboard(**{**AS_PRINTED, **params})
 
 
 @lru_cache(maxsize=16)

@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from estimator.interface import Array
-from estimator.premerlani import Premerlani, PremerlaniParams
+from estimator.premerlani import Premerlani
 from estimator.rotation import heading_error_rad
 from scenarios.claims._open_loop import (
     STEP_S,
+    aboard,
     attitude_deg,
     begin,
     inclination_deg,
@@ -96,9 +97,9 @@ def _offset_removed(_seeds: Sequence[int]) -> Finding:
     replayed = {
         name: (begin(Premerlani(params), start).replay(misread(log, offset_rad_s=offset)), offset)
         for name, params, offset in (
-            ("constant", PremerlaniParams(), steady),
-            ("constant, no integral", PremerlaniParams(k_i=0.0), steady),
-            ("warming up", PremerlaniParams(), warming),
+            ("constant", aboard(), steady),
+            ("constant, no integral", aboard(k_i=0.0), steady),
+            ("warming up", aboard(), warming),
         )
     }
     error = {name: attitude_deg(out["R_eb"], log) for name, (out, _) in replayed.items()}
@@ -243,7 +244,7 @@ def _standing(seeds: Sequence[int]) -> Finding:
     for seed in seeds:
         log = sensed(PAUSE, END_S, "generic", {}, seed)
         t_s, speed = log.truth["t_s"], log.truth["v_e_m_s"][:, 0]
-        out = begin(Premerlani(), log.truth["R_eb"][0]).replay(log.measured)
+        out = begin(Premerlani(aboard()), log.truth["R_eb"][0]).replay(log.measured)
         error = np.degrees(heading_error_rad(out["R_eb"], log.truth["R_eb"]))
         still = (t_s > PAUSE.stop_s + PAUSE.change_s + 3.0) & (t_s < PAUSE.go_s)
         first, last = np.flatnonzero(still)[[0, -1]]

@@ -12,6 +12,7 @@ from estimator.interface import ImuSample
 from estimator.premerlani import Premerlani
 from scenarios.claims._open_loop import (
     IMU_HZ,
+    aboard,
     attitude_deg,
     begin,
     inclination_deg,
@@ -212,7 +213,7 @@ def _no_accumulation(_seeds: Sequence[int]) -> Finding:
     t_s, start = log.truth["t_s"], log.truth["R_eb"][0]
     rows = log.measured.copy()
     rows["force_b_m_s2"][:, 1] += BIAS_G * 9.80665
-    leaning = inclination_deg(begin(Premerlani(), start).replay(rows)["R_eb"], log)
+    leaning = inclination_deg(begin(Premerlani(aboard()), start).replay(rows)["R_eb"], log)
     offset = np.radians([GYRO_DEG_S, 0.0, 0.0])
     turning = inclination_deg(begin(GyroOnly(), start).replay(misread(log, offset_rad_s=offset))["R_eb"], log)
     minute = round(MINUTE_S * IMU_HZ) - 1

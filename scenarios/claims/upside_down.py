@@ -13,7 +13,7 @@ from estimator.interface import Array
 from estimator.kernels import wrap
 from estimator.premerlani import Premerlani
 from scenarios.claims._flown import course_rad
-from scenarios.claims._open_loop import begin, inclination_deg, sensed
+from scenarios.claims._open_loop import aboard, begin, inclination_deg, sensed
 from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claim_flights import flights
 from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, axes, label
@@ -102,7 +102,7 @@ def _upside_down(seeds: Sequence[int]) -> Finding:
     for way, log in logs.items():
         roll_rad = math.pi if way == "back" else 0.0
         start = rotation_from_euler(np.array([roll_rad]), 0.0, OFF_RAD)[0]  # wings level, the heading 40 degrees wrong
-        R_eb = found[way] = begin(Premerlani(), start).replay(log.measured)["R_eb"]
+        R_eb = found[way] = begin(Premerlani(aboard()), start).replay(log.measured)["R_eb"]
         steering[way], tilt[way] = _steering_error_deg(R_eb, log), inclination_deg(R_eb, log)
     later = logs["back"].truth["t_s"] > SETTLED_S
     r_zz, true_r_zz = found["back"][:, 2, 2], logs["back"].truth["R_eb"][:, 2, 2]

@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from estimator.premerlani import PremerlaniParams
 from scenarios.claims import centrifugal, course, latency, launch, upside_down, vertical_flight
 from scenarios.claims._flown import crab_deg, median, slowest
-from scenarios.claims._open_loop import begin, inclination_deg, sensed
+from scenarios.claims._open_loop import aboard, begin, inclination_deg, sensed
 from scenarios.claims.centrifugal import Uncompensated
 from scenarios.claims.latency import Kink
 from scenarios.claims.upside_down import BANK_RAD, OnItsBack
@@ -65,7 +64,7 @@ def test_uncompensated_estimator_is_drawn_to_the_felt_vertical():
     turn = SteadyTurn(math.radians(10.0))
     log = sensed(turn, 60.0)
     weight = 0.3
-    estimator = begin(Uncompensated(PremerlaniParams(w_rp=weight, w_y=0.0, k_i=0.0)), log.truth["R_eb"][0])
+    estimator = begin(Uncompensated(aboard(w_rp=weight, w_y=0.0, k_i=0.0)), log.truth["R_eb"][0])
     tilt_deg = inclination_deg(estimator.replay(log.measured)["R_eb"], log)[-1]
     expected_deg = 10.0 * weight / math.hypot(weight, turn.turn_rate_rad_s)
     assert tilt_deg == pytest.approx(expected_deg, rel=0.03, abs=0)  # sine for angle: 0.5 %

@@ -12,7 +12,7 @@ from autopilot.failsafe import FailsafeParams
 from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Script
 from estimator.interface import Health
-from estimator.premerlani import Premerlani
+from estimator.premerlani import Premerlani, PremerlaniParams
 from sim.air import Air
 from sim.clock import Rates
 from sim.jsbsim_plant import JsbsimPlant
@@ -24,6 +24,8 @@ from sim.sensors.suite import SUITES, Suite
 
 AHEAD = Setpoint(Mode.COURSE, height_m=100.0)
 AIR = Air((0.0, -4.0, 0.0), 3.0)
+GPS = SUITES["generic"].gps
+KNOWN = PremerlaniParams(gps_filter_s=GPS.filter_s, gps_latency_s=GPS.latency_s)  # to the estimator
 
 
 def flown(script, duration_s, *, estimator=None, height_m=100.0, aircraft="endurance", faults=(), seed=0) -> Flight:
@@ -32,7 +34,9 @@ def flown(script, duration_s, *, estimator=None, height_m=100.0, aircraft="endur
     plant = JsbsimPlant(aircraft, start=InFlight(0.0, height_m=height_m), air=AIR, rates=rates, seed=seed)
     suite = Suite(SUITES["generic"], rates, seed, 0, list(faults), 0.0)
     autopilot = DcmAutopilot(aircraft=aircraft)
-    return fly(plant, suite, estimator or Premerlani(), autopilot, Script(script), Log.empty(rates.ticks(duration_s)))
+    return fly(
+        plant, suite, estimator or Premerlani(KNOWN), autopilot, Script(script), Log.empty(rates.ticks(duration_s))
+    )
 
 
 def heights_m(flight):
@@ -110,7 +114,7 @@ def without_level(monkeypatch):
 @pytest.mark.parametrize("mode", [Mode.COURSE, Mode.STABILISE])
 def test_unhealthy_estimator_stays_aloft_for_a_minute_with_wings_level(mode):
     """On gyros alone from the last healthy attitude on: the bank drifts, and stays below 20 degrees (14 measured)."""
-    flight = flown([(0.0, replace(AHEAD, mode=mode))], 140.0, estimator=FallsIll())
+    flight = flown([(0.0, replace(AHEAD, mode=mode))], 140.0, estimator=FallsIll(KNOWN))
     assert flight.outcome == Outcome.COMPLETED
     assert modes(flight) == [mode, Mode.LEVEL]
     assert abs(bank_deg(flight)[3300:]).max() < 20.0
@@ -121,7 +125,7 @@ def test_unhealthy_estimator_stays_aloft_for_a_minute_with_wings_level(mode):
 def test_unhealthy_estimator_would_crash_who_believes_it(monkeypatch):
     """What the test above tells apart."""
     without_level(monkeypatch)
-    assert flown([(0.0, AHEAD)], 140.0, estimator=FallsIll()).outcome == Outcome.GROUND_CONTACT
+    assert flown([(0.0, AHEAD)], 140.0, estimator=FallsIll(KNOWN)).outcome == Outcome.GROUND_CONTACT
 
 
 def test_low_height_climbs_straight_before_it_turns():

@@ -2,6 +2,7 @@
 
 import json
 import math
+from importlib import import_module
 
 import pytest
 
@@ -40,6 +41,29 @@ def test_every_known_property_arrives_at_every_estimator_that_has_a_parameter_fo
     for name in wanted & record.given.keys():
         assert getattr(code.params, name) == record[name].value, name
         assert known[name] == record[name]
+
+
+# Defaults that are no assumption, with the reason.
+NOT_ASSUMED = {
+    ("ins_ekf", "gps_stamped"): "an unknown stamp is NaN, which the filter takes for none",
+    ("premerlani", "force_full_scale_m_s2"): "without a full scale no axis counts as clipped, as in the paper",
+}
+
+
+@pytest.mark.parametrize("estimator", sorted(ESTIMATORS))
+def test_default_of_a_parameter_is_what_is_assumed_where_nothing_is_known(estimator):
+    """Constructed bare, an estimator flies with the same instruments as one with an empty record; to a rounded 0.1."""
+    module, _, name = ESTIMATORS[estimator].partition(":")
+    params = getattr(getattr(import_module(module), name)(), "params", None)
+    wanted = own_parameters(estimator) & {name for name, known in PROPERTIES.items() if known.assumed is not None}
+    assert {name for of, name in NOT_ASSUMED if of == estimator} <= wanted
+    for name in wanted - {name for of, name in NOT_ASSUMED if of == estimator}:
+        assert getattr(params, name) == pytest.approx(PROPERTIES[name].assumed, rel=0, abs=_rounded(name)), name
+
+
+def _rounded(name):
+    """How far the assumed value of a property is rounded: full scales to a digit after the point."""
+    return 0.1 if name.endswith(("full_scale_rad_s", "full_scale_m_s2")) else 0.0
 
 
 @pytest.mark.parametrize("suite", sorted(SUITES))

@@ -16,10 +16,17 @@ from sim.clock import Rates
 from sim.log import Log, Phase
 from sim.place import LATITUDE_DEG
 from sim.prescribed_plant import GRAVITY_M_S2, Kinematics, motion_rows, rotation_from_euler
+from sim.sensors.noise import STANDARD_GRAVITY_M_S2
 from sim.sensors.suite import SUITES, Suite
 
 N_FLIGHTS, DURATION_S, SETTLED_S = 16, 70.0, 15.0
+GENERIC = SUITES["generic"]
 ASSUMED_S, LATENCY_SIGMA_S = 0.3, 0.1
+ASSUMED = InsEkfParams(
+    gps_filter_s=GENERIC.gps.filter_s, gps_stamped=False, gps_latency_s=ASSUMED_S, gps_latency_sigma_s=LATENCY_SIGMA_S,
+    gyro_full_scale_rad_s=math.radians(GENERIC.gyro.range_deg_s),
+    force_full_scale_m_s2=GENERIC.accelerometer.range_g * STANDARD_GRAVITY_M_S2,
+)  # fmt: skip
 LATE_S = 0.0075  # a fix arrives in the tick of 0.02 s that its latency ends in: later by 0 to 3 steps of 0.005 s
 
 
@@ -97,11 +104,10 @@ def fly(seed):
     latency_s = (
         round(float(np.clip(rng.normal(ASSUMED_S, LATENCY_SIGMA_S), 0.02, 1.0)) * rates.physics_hz) / rates.physics_hz
     )
-    params = replace(SUITES["generic"], gps=replace(SUITES["generic"].gps, latency_s=latency_s))
+    params = replace(GENERIC, gps=replace(GENERIC.gps, latency_s=latency_s))
     suite = Suite(params, rates, seed)
     suite.reset(log)
-    assumed = {"gps_stamped": False, "gps_latency_s": ASSUMED_S, "gps_latency_sigma_s": LATENCY_SIGMA_S}
-    estimator = InsEkf(InsEkfParams(**assumed))
+    estimator = InsEkf(ASSUMED)
     errors = {name: [] for name in ("tilt", "heading", "velocity", "gyro bias", "wind", "latency")}
     for k in range(len(log)):
         estimator.update(suite.measure(k))

@@ -1,6 +1,7 @@
 """Gains from a time of recovery: the linearised loop against the matrix exponential, and the whole estimator."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from estimator.premerlani import G_M_S2, Premerlani, PremerlaniParams
 from estimator.rotation import heading_rad, inclination_error_rad
 
 DT = 0.02
+RECEIVER = {"gps_filter_s": 1.0, "gps_latency_s": 0.3}
 
 
 def loop(weight, k_p, k_i):
@@ -94,13 +96,13 @@ def test_recommended_gains_estimator_recovers_its_heading_in_a_quarter_of_that_t
 
 def test_recommended_gains_with_the_lag_in_the_loop_stay_stable():
     """K_P W_Y lag = 30 degrees: hardly an overshoot; three times that weight, and the heading swings."""
-    base = PremerlaniParams(rotate_history=False)
+    base = PremerlaniParams(**RECEIVER, rotate_history=False)
     p = recommended_gains(10.0, base=base)
     assert p.k_p * p.w_y * 1.3 == pytest.approx(math.radians(30.0), rel=1e-12)
     R = Rotation.from_euler("z", 30.0, degrees=True).as_matrix()
     overshoot = {}
     for times in (1.0, 4.0):
-        params = PremerlaniParams(rotate_history=False, w_rp=p.w_rp, w_y=times * p.w_y, k_i=0.0)
+        params = replace(base, w_rp=p.w_rp, w_y=times * p.w_y, k_i=0.0)
         overshoot[times] = -math.degrees(heading_rad(estimates_from(params, R, 60.0)["R_eb"]).min())
     assert overshoot[1.0] < 3.0  # a tenth
     assert overshoot[4.0] > 9.0

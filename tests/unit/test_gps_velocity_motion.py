@@ -13,6 +13,7 @@ from estimator.rotation import heading_error_rad, heading_rad, inclination_error
 
 G, SPEED, DT = gps_velocity.G_M_S2, 12.6, 0.02
 FILTER_S, LATENCY_S = 1.0, 0.3
+RECEIVER = {"gps_filter_s": FILTER_S, "gps_latency_s": LATENCY_S}  # with which every motion here is seen
 
 
 def rows_of(duration_s, gps_hz=4):
@@ -60,7 +61,7 @@ def surging(duration_s, heading=0.7, swing_m_s=4.0, hz=0.1):
 
 def power_up(R, **params):
     """An estimator that starts from rest at `R` (its heading is then unknown)."""
-    estimator = GpsVelocity(GpsVelocityParams(**params))
+    estimator = GpsVelocity(GpsVelocityParams(**{**RECEIVER, **params}))
     estimator.reset(ImuSample(0.0, DT, np.zeros(3), R.T @ [0.0, 0.0, -G]))
     return estimator
 
@@ -135,7 +136,7 @@ def test_surge_before_yaw_is_locked_the_stand_in_is_gated():
 def test_yaw_lock_from_any_heading_takes_less_than_10_s(off_deg):
     """Within 15 degrees for good, and said so; while far off, never called good."""
     rows, R = turning(15.0, 0.0, heading_0=math.radians(off_deg))
-    estimates = GpsVelocity().replay(rows)
+    estimates = GpsVelocity(GpsVelocityParams(**RECEIVER)).replay(rows)
     off = np.degrees(np.abs(heading_error_rad(estimates["R_eb"], R)))
     assert off[-250:].max() < 15.0
     assert estimates["health"][-1] == Health.GOOD
@@ -244,7 +245,7 @@ def test_rubbish_of_all_kinds_never_leaves_the_rotations(reference):
         scale = rng.choice([0.0, 1.0, 30.0, 900.0, 1e30, np.nan], (len(rows), 1))
         rows[name] = scale * rng.standard_normal((len(rows), 3))
     rows["gps_new"], rows["mag_new"] = rng.integers(0, 2, (2, len(rows)))
-    estimates = GpsVelocity(GpsVelocityParams(yaw_reference=reference, w_y=20.0, w_rp=20.0)).replay(rows)
+    estimates = GpsVelocity(GpsVelocityParams(**RECEIVER, yaw_reference=reference, w_y=20.0, w_rp=20.0)).replay(rows)
     R = estimates["R_eb"]
     assert np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max() < 1e-3
     assert np.linalg.det(R).min() > 0.0

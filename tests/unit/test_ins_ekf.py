@@ -1,6 +1,7 @@
 """The navigation filter in flight: start, heading, delay, refusals, silence, options, and its books."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,11 +12,17 @@ from estimator.rotation import from_euler, heading_error_rad, inclination_error_
 
 G = 9.80665
 DT_S = 0.02
+FILTER_S, LATENCY_S = 1.0, 0.3
+GENERIC = InsEkfParams(
+    gps_filter_s=FILTER_S, gps_latency_s=LATENCY_S, gps_latency_sigma_s=0.0,
+    gyro_full_scale_rad_s=math.radians(300.0), force_full_scale_m_s2=3.0 * G,
+)  # fmt: skip
+"""The receiver of the motions here, its latency known, and the inertial unit of the generic suite."""
 
 
 def coordinated(
-    duration_s=60.0, rate_rad_s=0.3, speed_m_s=13.0, wind=(0.0, 0.0), filter_s=1.0, latency_s=0.3, heading_rad=2.0,
-    stamped=True,
+    duration_s=60.0, rate_rad_s=0.3, speed_m_s=13.0, wind=(0.0, 0.0), filter_s=FILTER_S, latency_s=LATENCY_S,
+    heading_rad=2.0, stamped=True,
 ):  # fmt: skip
     """Straight and in turns by the square of a sine, without noise: rows and true attitudes."""
     n = round(duration_s / DT_S)
@@ -43,7 +50,7 @@ def coordinated(
     return rows, from_euler(roll, np.zeros(n), end)
 
 
-def replayed(rows, params=None, on_ground=None):
+def replayed(rows, params=GENERIC, on_ground=None):
     """Estimates of a fresh filter over the rows, and the filter."""
     estimator = InsEkf(params)
     estimator.reset(on_ground)
@@ -103,7 +110,7 @@ def test_delay_is_that_of_the_stamps_even_where_the_parameter_is_wrong():
     assert by_stamp[0] <= 1.0
     assert by_parameter[0] > 3.0 * by_stamp[0]
     rows, R_true = coordinated(latency_s=0.8, rate_rad_s=0.5, stamped=False)
-    estimates, _ = replayed(rows, InsEkfParams(gps_latency_s=0.8))
+    estimates, _ = replayed(rows, replace(GENERIC, gps_latency_s=0.8))
     assert errors_deg(estimates[1500:], R_true[1500:])[0].max() <= 1.0
 
 
@@ -112,7 +119,7 @@ def test_delay_is_that_of_the_stamps_even_where_the_parameter_is_wrong():
 def test_latency_of_unstamped_fixes_is_learnt_in_turns(true_s, filter_s):
     """Assumed 0.3 +- 0.2 s, the latency of the receiver that made the rows is found to a sample, and reported."""
     rows, R_true = coordinated(120.0, latency_s=true_s, filter_s=filter_s, stamped=False, rate_rad_s=0.5)
-    estimates, estimator = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.2, gps_filter_s=filter_s))
+    estimates, estimator = replayed(rows, replace(GENERIC, gps_latency_sigma_s=0.2, gps_filter_s=filter_s))
     assert estimator.learnt.keys() == {"gps_latency_s"}
     # The rows hold rates at the ends of ticks, not means over them: half a tick of 0.02 s.
     assert estimator.learnt["gps_latency_s"] == pytest.approx(true_s, rel=0, abs=0.02)
@@ -123,9 +130,9 @@ def test_latency_of_unstamped_fixes_is_learnt_in_turns(true_s, filter_s):
 def test_latency_unstamped_by_nan_is_learnt_as_well():
     """A stamp of NaN is none: the same latency is learnt as with stamps of another clock."""
     rows, _ = coordinated(120.0, latency_s=0.5, stamped=False)
-    _, other_clock = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.2))
+    _, other_clock = replayed(rows, replace(GENERIC, gps_latency_sigma_s=0.2))
     rows["gps_t_s"] = np.nan
-    _, unknown = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.2))
+    _, unknown = replayed(rows, replace(GENERIC, gps_latency_sigma_s=0.2))
     assert unknown.learnt == other_clock.learnt != {}
 
 
@@ -133,7 +140,7 @@ def test_latency_unstamped_by_nan_is_learnt_as_well():
 def test_latency_that_is_known_is_not_learnt(stamped, sigma_s):
     """With stamps, or with a sigma of zero, nothing is learnt, and the latency stays what it was."""
     rows, _ = coordinated(latency_s=0.5, stamped=stamped)
-    _, estimator = replayed(rows, InsEkfParams(gps_latency_sigma_s=sigma_s))
+    _, estimator = replayed(rows, replace(GENERIC, gps_latency_sigma_s=sigma_s))
     assert estimator.learnt == {}
     assert estimator.snapshot()["latency_s"][0] == 0.3
     assert estimator.sigma()["gps_latency_s"][0] == pytest.approx(sigma_s, rel=0, abs=1e-12)
@@ -142,7 +149,7 @@ def test_latency_that_is_known_is_not_learnt(stamped, sigma_s):
 def test_latency_in_straight_flight_is_not_learnt():
     """Without acceleration a delay shows nowhere: the sigma stays, and nothing is reported."""
     rows, _ = coordinated(latency_s=0.5, stamped=False, rate_rad_s=0.0)
-    _, estimator = replayed(rows, InsEkfParams(gps_latency_sigma_s=0.15))
+    _, estimator = replayed(rows, replace(GENERIC, gps_latency_sigma_s=0.15))
     assert estimator.learnt == {}
     assert estimator.sigma()["gps_latency_s"][0] > 0.1
 
@@ -156,22 +163,23 @@ def test_vertical_velocity_that_is_not_reported_is_not_fused():
     t = rows["t_s"]
     sinking = 0.5 * 2.0 * np.pi / 8.0 * 6.0 * np.cos(2.0 * np.pi * t / 8.0)  # of v_z = 3 sin: amplitude 3 m/s
     rows["force_b_m_s2"] += R_true[:, 2, :] * sinking[:, None]
-    withheld, _ = replayed(rows, InsEkfParams(gps_vertical_velocity=False))
+    withheld, _ = replayed(rows, replace(GENERIC, gps_vertical_velocity=False))
     fused, _ = replayed(rows)
     tilt_withheld, tilt_fused = (errors_deg(e[2000:], R_true[2000:])[0].max() for e in (withheld, fused))
     assert tilt_withheld <= 2.0
     assert tilt_fused > 2.0 * tilt_withheld
     rows["gps_v_e_m_s"][:, 2] = np.nan  # no receiver should: nobody looks at it
-    unread, _ = replayed(rows, InsEkfParams(gps_vertical_velocity=False))
+    unread, _ = replayed(rows, replace(GENERIC, gps_vertical_velocity=False))
     np.testing.assert_array_equal(unread["R_eb"], withheld["R_eb"])
 
 
 def test_perfect_sensors_are_accepted_and_the_filter_stays_able_to_learn():
     """Noise, biases and gains of zero, no full scale: P stays positive, and a tilt of 10 degrees still goes."""
-    perfect = InsEkfParams(
-        gyro_noise_rad_s_sqrt_hz=0.0, gyro_bias_sigma_rad_s=0.0, gyro_walk_rad_s_sqrt_s=0.0, gyro_gain_sigma=0.0,
-        gyro_cross_axis=0.0, gyro_full_scale_rad_s=math.inf, force_noise_m_s2_sqrt_hz=0.0, force_bias_sigma_m_s2=0.0,
-        force_full_scale_m_s2=math.inf, gps_noise_m_s=0.0, gps_filter_s=0.0, gps_latency_s=0.0,
+    perfect = replace(
+        GENERIC, gyro_noise_rad_s_sqrt_hz=0.0, gyro_bias_sigma_rad_s=0.0, gyro_walk_rad_s_sqrt_s=0.0,
+        gyro_gain_sigma=0.0, gyro_cross_axis=0.0, gyro_full_scale_rad_s=math.inf, force_noise_m_s2_sqrt_hz=0.0,
+        force_bias_sigma_m_s2=0.0, force_full_scale_m_s2=math.inf, gps_noise_m_s=0.0, gps_filter_s=0.0,
+        gps_latency_s=0.0,
     )  # fmt: skip
     rows, R_true = coordinated(filter_s=0.0, latency_s=0.0)
     estimator = InsEkf(perfect)
@@ -192,7 +200,7 @@ def test_gyro_bias_of_any_size_that_the_calibration_found_is_kept():
     bias = np.radians([20.0, -15.0, 10.0])
     rows["gyro_b_rad_s"] += bias
     held = ImuSample(0.0, DT_S, bias, np.array([0.0, 0.0, -G]))
-    estimates, estimator = replayed(rows, InsEkfParams(gyro_bias_sigma_rad_s=math.radians(0.05)), held)
+    estimates, estimator = replayed(rows, replace(GENERIC, gyro_bias_sigma_rad_s=math.radians(0.05)), held)
     np.testing.assert_allclose(estimates["gyro_bias_b_rad_s"][-1], bias, rtol=0, atol=math.radians(0.1))
     assert errors_deg(estimates[1500:], R_true[1500:])[0].max() <= 1.0
     assert estimator.refused == {}
@@ -202,7 +210,7 @@ def test_flight_that_begins_in_the_air_after_a_calibration_on_the_ground_finds_i
     """Calibrated at rest, then at once at 13 m/s in a crosswind: the heading is the course to begin with."""
     rows, R_true = coordinated(wind=(-2.0, 1.0))
     held = ImuSample(0.0, DT_S, np.zeros(3), np.array([0.0, 0.0, -G]))
-    estimates, estimator = replayed(rows, None, held)
+    estimates, estimator = replayed(rows, on_ground=held)
     assert errors_deg(estimates[200:], R_true[200:])[1].max() <= 20.0  # the crab angle is 12 deg
     assert errors_deg(estimates[1500:], R_true[1500:])[1].max() <= 2.0
     assert estimator.refused == {}
@@ -215,7 +223,7 @@ def test_receiver_noisier_than_assumed_is_given_less_weight():
     rows["gps_v_e_m_s"][fixes] += 0.5 * np.random.default_rng(3).standard_normal((len(fixes), 3))
     rms = []
     for noise_m_s in (0.5, 0.1):
-        estimator = InsEkf(InsEkfParams(gps_noise_m_s=noise_m_s))
+        estimator = InsEkf(replace(GENERIC, gps_noise_m_s=noise_m_s))
         estimator.reset()
         estimator.replay(rows[:2000])
         rejected_at_first = estimator.rejected
@@ -242,7 +250,7 @@ def test_outlier_is_refused_counted_and_harmless():
 def test_everything_refused_too_long_starts_again():
     """The attitude overturned in flight, as after a saturated gyro: fixes are refused, and 20 s later all is well."""
     rows, R_true = coordinated(80.0)
-    estimator = InsEkf()
+    estimator = InsEkf(GENERIC)
     estimator.replay(rows[:1500])
     snapshot = estimator.snapshot()
     for name in ("R_eb", "R_filter_eb"):
@@ -291,9 +299,9 @@ def test_magnetometer_finds_the_heading_at_rest_with_declination():
     field_e = 20.0 * np.array([math.cos(declination), math.sin(declination), 2.4])
     rows["mag_new"][::5], rows["mag_b_ut"] = 1, R_true.T @ field_e
     held = ImuSample(0.0, DT_S, np.zeros(3), R_true[2] * -G)
-    with_mag, _ = replayed(rows, InsEkfParams(magnetometer_calibrated=True, declination_rad=declination), held)
+    with_mag, _ = replayed(rows, replace(GENERIC, magnetometer_calibrated=True, declination_rad=declination), held)
     rows["mag_new"] = 0
-    without, _ = replayed(rows, None, held)
+    without, _ = replayed(rows, on_ground=held)
     assert abs(heading_error_rad(with_mag["R_eb"][-1], R_true)) <= math.radians(0.1)
     assert abs(heading_error_rad(without["R_eb"][-1], R_true)) > 1.0
 
@@ -307,7 +315,7 @@ def test_uncalibrated_magnetometer_gives_the_first_heading_and_no_more():
     rest["force_b_m_s2"] = R_rest[2] * -G
     rest["mag_new"][::5], rest["mag_b_ut"] = 1, R_rest.T @ np.array([20.0, 0.0, 48.0])
     held = ImuSample(0.0, DT_S, np.zeros(3), R_rest[2] * -G)
-    standing, _ = replayed(rest, None, held)
+    standing, _ = replayed(rest, on_ground=held)
     assert abs(heading_error_rad(standing["R_eb"][-1], R_rest)) <= math.radians(0.1)
     assert set(standing["health"]) == {Health.STARTING}
     rows, R_true = coordinated()
@@ -334,7 +342,7 @@ def test_a_cut_off_reading_makes_the_filter_unsure():
     """A throw at full scale leaves a velocity less certain than one just below it."""
     sigmas = []
     for force in (0.90, 0.98):
-        estimator = InsEkf()
+        estimator = InsEkf(GENERIC)
         estimator.reset(ImuSample(0.0, DT_S, np.zeros(3), np.array([0.0, 0.0, -G])))
         rows = np.zeros(60, MEASURED_DTYPE)
         rows["t_s"], rows["dt_s"] = (np.arange(60) + 1) * DT_S, DT_S
@@ -354,7 +362,7 @@ def test_replay_equals_streaming_and_snapshots_go_on_exactly():
     rows["force_b_m_s2"][900, 1] = np.inf
     rows["gps_v_e_m_s"][rows["gps_new"] == 1] += 0.1 * rng.standard_normal((int(rows["gps_new"].sum()), 3))
     whole, one = replayed(rows)
-    streaming, resumed = InsEkf(), InsEkf()
+    streaming, resumed = InsEkf(GENERIC), InsEkf(GENERIC)
     for k in range(len(rows)):
         estimate = streaming.update(Measurements(rows, k))
         np.testing.assert_array_equal(estimate.R_eb, whole["R_eb"][k])
@@ -383,7 +391,7 @@ def test_garbage_never_leaves_the_rotations(seed):
     rows["airspeed_m_s"] = rng.choice([13.0, np.nan, -5.0, 1e6, 900.0], n)
     for name in ("gps_new", "mag_new", "air_new"):
         rows[name] = rng.random(n) < 0.3
-    estimates, estimator = replayed(rows, InsEkfParams(magnetometer_calibrated=True))
+    estimates, estimator = replayed(rows, replace(GENERIC, magnetometer_calibrated=True))
     R = estimates["R_eb"]
     assert np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max() < 1e-6
     assert np.linalg.det(R).min() > 0.0

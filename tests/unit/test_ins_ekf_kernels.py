@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.ins_ekf import STATE_DTYPE, InsEkf
+from estimator.ins_ekf import STATE_DTYPE, InsEkf, InsEkfParams
 from estimator.ins_ekf_kernels import (
     BIAS,
     FORCE,
@@ -29,6 +29,7 @@ from estimator.ins_ekf_kernels import (
     turn_in_earth,
 )
 
+PARAMS = InsEkfParams(gps_filter_s=1.0, gps_latency_s=0.3, gps_latency_sigma_s=0.0)  # a receiver that filters
 GYRO, FORCE_B = np.array([0.6, -0.9, 1.3]), np.array([1.5, -2.0, -13.0])
 VECTORS = (
     ("v_e_m_s", VEL, 3),
@@ -44,7 +45,7 @@ VECTORS = (
 def some_state(seed=3):
     """A state record in the middle of a flight, with a covariance that correlates everything."""
     rng = np.random.default_rng(seed)
-    state = InsEkf().snapshot()
+    state = InsEkf(PARAMS).snapshot()
     s = state[0]
     s["R_filter_eb"] = Rotation.from_rotvec(rng.normal(0.0, 1.0, 3)).as_matrix()
     s["v_e_m_s"], s["lagged_v_e_m_s"] = [9.0, -8.0, 1.0], [10.0, -5.0, 0.5]
@@ -139,17 +140,16 @@ def test_advance_state_equals_scipy_and_the_filter_of_the_receiver():
 def test_predict_equals_a_plain_kalman_filter():
     """P <- F P F^T + Q, with Q written out anew; round-off."""
     state, dt_s = some_state(), 0.02
-    params = InsEkf().params
     F, after = transition(state, dt_s)
     rate = after["rate_b"][0]
     Q = np.zeros(N)
-    Q[TILT : TILT + 3] = params.gyro_noise_rad_s_sqrt_hz**2 / 2.0 + 4.0 * params.gyro_cross_axis**2 * rate @ rate
+    Q[TILT : TILT + 3] = PARAMS.gyro_noise_rad_s_sqrt_hz**2 / 2.0 + 4.0 * PARAMS.gyro_cross_axis**2 * rate @ rate
     # An accelerometer that pulls beyond 1 g errs by half its bias sigma for each g, for 2 s in one direction.
     pull_g = np.linalg.norm(FORCE_B - state["force_bias_b_m_s2"][0]) / 9.80665 - 1.0
     Q[VEL : VEL + 3] = (
-        params.force_noise_m_s2_sqrt_hz**2 / 2.0 + 4.0 * (0.5 * params.force_bias_sigma_m_s2 * pull_g) ** 2
+        PARAMS.force_noise_m_s2_sqrt_hz**2 / 2.0 + 4.0 * (0.5 * PARAMS.force_bias_sigma_m_s2 * pull_g) ** 2
     )
-    Q[WIND_NE : WIND_NE + 2] = params.wind_walk_m_s_sqrt_s**2
+    Q[WIND_NE : WIND_NE + 2] = PARAMS.wind_walk_m_s_sqrt_s**2
     expected = (
         F @ state["P"][0] @ F.T + np.diag(Q) * dt_s
     )  # the biases and the latency are at their limit: no more noise

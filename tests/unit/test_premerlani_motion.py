@@ -13,6 +13,7 @@ from estimator.premerlani import Premerlani, PremerlaniParams
 from estimator.rotation import heading_rad, inclination_error_rad
 
 G, SPEED, DT = premerlani.G_M_S2, 12.6, 0.02
+RECEIVER = {"gps_filter_s": 1.0, "gps_latency_s": 0.3}  # with which every turn here is seen
 
 
 def at_rest(duration_s, R=None, offset=(0.0, 0.0, 0.0), dt=DT):
@@ -26,11 +27,12 @@ def at_rest(duration_s, R=None, offset=(0.0, 0.0, 0.0), dt=DT):
     return rows
 
 
-def turning(duration_s, bank_deg, heading_0=0.4, gps_hz=5, filter_s=1.0, latency_s=0.3):
+def turning(duration_s, bank_deg, heading_0=0.4, gps_hz=5):
     """Rows and true attitudes (N, 3, 3) of a coordinated level turn (bank 0: straight), seen by ideal sensors.
 
     The fix is the closed form of the receiver's filter in the steady state: v / (1 + i omega T), a latency ago.
     """
+    filter_s, latency_s = RECEIVER["gps_filter_s"], RECEIVER["gps_latency_s"]
     bank = math.radians(bank_deg)
     rate = G * math.tan(bank) / SPEED
     rows = at_rest(duration_s)
@@ -44,9 +46,14 @@ def turning(duration_s, bank_deg, heading_0=0.4, gps_hz=5, filter_s=1.0, latency
     return rows, R
 
 
-def power_up(R, params=None):
-    """An estimator that starts from rest at `R` (its heading is then unknown)."""
-    estimator = Premerlani(params)
+def aboard(**params):
+    """An estimator that knows the receiver."""
+    return Premerlani(PremerlaniParams(**RECEIVER, **params))
+
+
+def power_up(R, **params):
+    """The same, started from rest at `R` (its heading is then unknown)."""
+    estimator = aboard(**params)
     estimator.reset(ImuSample(0.0, DT, np.zeros(3), R.T @ [0.0, 0.0, -G]))
     return estimator
 
@@ -119,7 +126,7 @@ def test_power_up_without_a_usable_sample_is_level_north_and_without_offset(on_g
 def test_coordinated_turn_at_35_degrees_of_bank_keeps_the_attitude():
     """Two minutes of turning: centrifugal term, restored speed and lag filter together leave next to no tilt."""
     rows, R = turning(120.0, 35.0)
-    estimator = power_up(R[0], PremerlaniParams(k_i=0.0))  # else the memory of the lock takes K_P / K_I = 33 s to fade
+    estimator = power_up(R[0], k_i=0.0)  # else the memory of the lock takes K_P / K_I = 33 s to fade
     estimates = estimator.replay(rows)
     tilt = np.degrees(inclination_error_rad(estimates["R_eb"], R))
     # Eqn 17 leaves theta^3 / 3 a step, 0.0013 deg/s; held by W_RP = 0.3 / s that is 0.004 degrees at most.
@@ -134,7 +141,7 @@ def test_steady_turn_without_the_lag_filter_is_late_by_filter_and_latency_and_wi
     lag = math.degrees(math.atan(rate) + 0.3 * rate)
     lateness = {}
     for on in (True, False):
-        estimator = power_up(R[0], PremerlaniParams(gps_lag_filter=on))
+        estimator = power_up(R[0], gps_lag_filter=on)
         late = heading_rad(R) - heading_rad(estimator.replay(rows)["R_eb"])
         lateness[on] = math.degrees(math.remainder(float(late[-1]), 2 * math.pi))
     # Filtering the nose at the ends of 20 ms steps leads by half a step, 0.3 degrees.
@@ -147,7 +154,7 @@ def test_steady_turn_without_the_lag_filter_is_late_by_filter_and_latency_and_wi
 def test_speed_in_a_steady_turn_is_restored(rotate_history):
     """The receiver says 12 % too little at 35 degrees of bank; the quotient with the filtered nose is the speed."""
     rows, R = turning(40.0, 35.0)
-    estimator = power_up(R[0], PremerlaniParams(rotate_history=rotate_history))
+    estimator = power_up(R[0], rotate_history=rotate_history)
     estimator.replay(rows)
     assert rows["gps_speed_m_s"][0] < 0.89 * SPEED
     assert estimator.snapshot()["speed_m_s"][0] == pytest.approx(SPEED, rel=0, abs=0.02)
@@ -160,7 +167,7 @@ def test_turn_speed_in_wind_is_the_speed_through_the_air(wind):
     rows["gps_speed_m_s"] += wind
     tilt, speed = {}, {}
     for learn in (False, True):
-        estimator = power_up(R[0], PremerlaniParams(turn_speed=learn, k_i=0.0))
+        estimator = power_up(R[0], turn_speed=learn, k_i=0.0)
         tilt[learn] = math.degrees(inclination_error_rad(estimator.replay(rows)["R_eb"][-1], R[-1]))
         speed[learn] = estimator.snapshot()["turn_speed_m_s"][0]
     assert speed[True] == pytest.approx(SPEED, rel=0, abs=0.01)  # learnt with a time constant of 3 s, for 60 s
@@ -173,7 +180,7 @@ def test_turn_speed_in_wind_is_the_speed_through_the_air(wind):
 def test_yaw_lock_from_any_heading_takes_less_than_20_s(off_deg, rotate_history):
     """After a launch the nose may be anywhere: within 15 degrees of the course for good, and said so, within 20 s."""
     rows, R = turning(20.0, 0.0, heading_0=math.radians(off_deg))
-    estimates = Premerlani(PremerlaniParams(rotate_history=rotate_history)).replay(rows)
+    estimates = aboard(rotate_history=rotate_history).replay(rows)
     off = np.abs(np.angle(np.exp(1j * (heading_rad(estimates["R_eb"]) - heading_rad(R)))))
     assert np.degrees(off[-250:]).max() < 15.0
     assert estimates["health"][-1] == Health.GOOD
@@ -184,8 +191,8 @@ def test_yaw_lock_from_any_heading_takes_less_than_20_s(off_deg, rotate_history)
 def test_yaw_lock_does_not_wind_the_integral_up():
     """Seconds at full strength are no gyro offset: the integral sees no more than the largest believable one."""
     rows, _ = turning(5.0, 0.0, heading_0=math.pi)
-    bias = Premerlani().replay(rows)["gyro_bias_b_rad_s"]
-    params = PremerlaniParams()
+    estimator = aboard()
+    bias, params = estimator.replay(rows)["gyro_bias_b_rad_s"], estimator.params
     assert np.abs(bias).max() < params.k_i / params.k_p * params.offset_limit_rad_s * 5.0
 
 

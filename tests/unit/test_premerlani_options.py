@@ -12,6 +12,7 @@ from estimator.premerlani import AIR_LIFE_S, G_M_S2, Premerlani, PremerlaniParam
 from estimator.rotation import heading_error_rad, inclination_error_rad
 
 DT, SPEED = 0.02, 12.6
+RECEIVER = {"gps_filter_s": 1.0, "gps_latency_s": 0.3}  # with which every estimator here flies
 STILL = np.array([0.0, 0.0, -G_M_S2])
 
 
@@ -54,7 +55,7 @@ def circling(duration_s, wind, bank_deg=35.0, heading_0=0.4, straight_s=0.0):
 
 def power_up(R, **params):
     """An estimator that starts from rest at `R`."""
-    estimator = Premerlani(PremerlaniParams(**params))
+    estimator = Premerlani(PremerlaniParams(**RECEIVER, **params))
     estimator.reset(ImuSample(0.0, DT, np.zeros(3), R.T @ STILL))
     return estimator
 
@@ -170,7 +171,7 @@ def test_airspeed_of_no_size_is_refused_and_changes_no_attitude():
 
 def test_airspeed_lost_in_flight_gives_way_to_ground_speed():
     """A sensor that falls silent counts for a second more."""
-    estimator = Premerlani()
+    estimator = Premerlani(PremerlaniParams(**RECEIVER))
     fix = GpsFix(0.0, np.zeros(3), np.zeros(3), 0.0, 10.0)
     turning, w = [], 0.5
     for k in range(100):
@@ -219,7 +220,7 @@ def test_learn_wind_streaming_tells_it_once_known():
 def test_w_y_until_lock_finds_the_heading_sooner_and_is_gone_after():
     """Thrown backwards: three times the weight needs a good deal less time, and in flight nothing is left of it."""
     rows, R = circling(30.0, (0.0, 0.0), bank_deg=0.0, heading_0=math.radians(150.0))
-    health = {w: Premerlani(PremerlaniParams(w_y_until_lock=w)).replay(rows)["health"] for w in (0.0, 3.6)}
+    health = {w: Premerlani(PremerlaniParams(**RECEIVER, w_y_until_lock=w)).replay(rows)["health"] for w in (0.0, 3.6)}
     locked_s = {w: np.argmax(h == Health.GOOD) * DT for w, h in health.items()}
     # 150 to 90 degrees at full strength, then like ln(tan): with 1.2 in 2.5 s, plus the second it must hold.
     assert locked_s[3.6] < 1.0 + 0.5 * (locked_s[0.0] - 1.0)

@@ -70,11 +70,14 @@ def assert_rotations(R):
     st.sampled_from([0.3, math.inf]),
     st.sampled_from([20.0, math.inf]),
     st.sampled_from([0.0, 5.0]),
+    st.sampled_from([0.0, 1.0]),
 )
-def test_replay_whatever_comes_stays_a_finite_rotation(drawn, switches, gate, clip, w_y_until_lock):
+def test_replay_whatever_comes_stays_a_finite_rotation(drawn, switches, gate, clip, w_y_until_lock, filter_s):
     """Any numbers, NaN and inf too, any clock, any gaps in the GPS: never raises, never leaves SO(3)."""
     switches["learn_wind"] &= switches["rotate_history"]
-    params = PremerlaniParams(**switches, launch_gate=gate, clip_m_s2=clip, w_y_until_lock=w_y_until_lock)
+    params = PremerlaniParams(
+        **switches, launch_gate=gate, clip_m_s2=clip, w_y_until_lock=w_y_until_lock, gps_filter_s=filter_s
+    )
     estimates = Premerlani(params).replay(rows_of(drawn))
     assert_rotations(estimates["R_eb"])
     assert np.all(np.isfinite(estimates["omega_b_rad_s"]))
@@ -183,8 +186,9 @@ def test_clock_set_back_costs_one_sample():
 UNKNOWN = np.full(3, np.nan)
 ALL_KINDS = [
     PremerlaniParams(),
+    PremerlaniParams(gps_filter_s=1.0),
     PremerlaniParams(gps_lag_filter=False, turn_speed=True),
-    PremerlaniParams(learn_wind=True, find_clip=True, w_y_until_lock=3.0),
+    PremerlaniParams(gps_filter_s=1.0, learn_wind=True, find_clip=True, w_y_until_lock=3.0),
     PremerlaniParams(rotate_history=False, use_airspeed=False, clip_m_s2=20.0, launch_gate=math.inf),
 ]
 
@@ -208,10 +212,11 @@ def test_replay_equals_streaming_bit_for_bit(params):
     assert batch.snapshot().tobytes() == stream.snapshot().tobytes()
 
 
-def test_snapshot_and_restore_go_on_bit_for_bit():
+@pytest.mark.parametrize("params", ALL_KINDS)
+def test_snapshot_and_restore_go_on_bit_for_bit(params):
     """N ticks, a snapshot, N more; restored, the same N more: also in another instance."""
     rows = flight(1000)
-    estimator, other = Premerlani(), Premerlani()
+    estimator, other = Premerlani(params), Premerlani(params)
     estimator.replay(rows[:500])
     snapshot = estimator.snapshot()
     once = estimator.replay(rows[500:])
