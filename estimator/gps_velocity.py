@@ -72,6 +72,7 @@ FIX_LIFE_S = 2.5  # reports further apart are compared no more
 LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown
 STAND_IN_S = 0.1  # how often the paper's correction is worked out where it stands in
 LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this close for this long
+LEAST_DOWN = 0.3  # of gravity, in the vertical as felt
 COURSE, NOSE, MAGNETOMETER = 0, 1, 2
 YAW_REFERENCES = ("course", "nose", "magnetometer")
 
@@ -222,7 +223,9 @@ def roll_pitch_at_fix(s, dv_e_m_s):  # type: ignore[no-untyped-def]
     left0, left1, left2 = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
     right0, right1, right2 = -dv_e_m_s[0], -dv_e_m_s[1], s.interval_s * G_M_S2 - dv_e_m_s[2]
     if not s.gps_vertical_velocity:
-        right2 = left2  # as felt: the cross product then compares the horizontal components
+        # As felt, so that the cross product compares the horizontal components; but downward, or an estimate that is
+        # upside down would stay so.
+        right2 = max(left2, LEAST_DOWN * s.interval_s * G_M_S2)
     # Eqn 4, divided by both lengths; by no less than half of gravity's, so that a fall without weight says little.
     least = 0.5 * s.interval_s * G_M_S2
     left_length = max(np.sqrt(left0 * left0 + left1 * left1 + left2 * left2), least)
