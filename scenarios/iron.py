@@ -18,8 +18,8 @@ Passes when    it survives and is never below 50 m (from 100 m); from 20 s to th
 
 Level, a hard iron h in the horizontal field b turns the needle by up to asin(h / b): here by 11.7 in 20.1 uT, 35
 degrees.  ``iron_uncalibrated`` flies by that, and worse: compared along a wrong heading the change of the GPS velocity
-becomes a tilt, and a tilt brings some of the vertical field, 2.4 times the horizontal one, into the heading.  That the
-receiver reports no vertical velocity is withheld there: the estimator then compares the zero, as the note of 2011 would.
+becomes a tilt, and a tilt brings some of the vertical field, 2.4 times the horizontal one, into the heading.  There
+it is withheld that the receiver reports no vertical velocity: the estimator compares the zero, as in the note of 2011.
 """
 
 import math
