@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from scenarios.harness import logs
 from scenarios.harness.cli import run
 from scenarios.harness.logs.recorded import LogError
-from scenarios.harness.replay import replay
+from scenarios.harness.replay import Window, replay, why_none
 
 PACKED = {"uint8_t": "B", "int32_t": "i", "uint32_t": "I", "uint64_t": "Q", "float": "f", "double": "d", "bool": "?"}
 TODAY = {
@@ -357,3 +357,15 @@ def test_replay_of_the_file_scores_as_the_flight_itself(logged, write, tmp_path,
     assert (data["rows"], data["reference_kind"]) == (1000, "truth")
     assert run(["replay", "flight.ulg", "--imu", "1", "--no-rerun", "--json", "-"]) == 0
     assert json.loads(capfd.readouterr().out)["rotation_rms_deg"] > 2.0 * data["rotation_rms_deg"]
+
+
+def test_attitude_without_a_number_is_one_that_cannot_be_judged(logged, write):
+    """The log has one: all of it is in the ledger, and the reason is said; it is not as if there had been none."""
+    told = [
+        (t, n, i, (*v[:2], *4 * [np.nan]) if "attitude" in n else v) for t, n, i, v in messages(logged)
+    ]  # fmt: skip
+    log = write(ulog(told))
+    entry = log.ledger["reference"]
+    assert (entry.read, entry.used, entry.left_out) == (len(logged.t_us), 0, {"no attitude": len(logged.t_us)})
+    said = f"vehicle_attitude_groundtruth in flight.ulg: none of it can be used, {len(logged.t_us)} no attitude"
+    assert why_none(log, Window()) == said

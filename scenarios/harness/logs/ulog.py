@@ -305,12 +305,18 @@ def _height(log: _Log) -> Stream | None:
 
 
 def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
+    """The true attitude, else the one flown on; where neither has a number, the first one that was logged."""
+    empty: tuple[Stream | None, Kind] = None, "filter"
     for name, kind in ATTITUDES:
         found = log.first(name)
         if found is None:
             continue
         quaternion = log.columns(name, found[1], *_each("q", 4))
         R_eb = tabular.attitude(dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)))
-        if R_eb is not None and np.isfinite(R_eb).any():
-            return Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9)), kind
-    return None, "filter"
+        if R_eb is None:
+            continue
+        attitude = Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9))
+        if np.isfinite(R_eb).any():
+            return attitude, kind
+        empty = empty if empty[0] else (attitude, kind)
+    return empty
