@@ -87,7 +87,7 @@ def take(
     told: dict[tuple[str, int], set[str]] = {}
     own: dict[str, str] = {}
     for name, m in meanings.columns.items():
-        values = columns[name]
+        values = np.where(np.isinf(columns[name]), np.nan, columns[name])  # no sensor reads infinity
         part = (of(name), len(values))
         table = parts.setdefault(part, {})
         if m.quantity in table:
@@ -104,7 +104,7 @@ def take(
     for group in groups:
         turn(group, meanings)
         if not group.told & set(EULER):
-            attitudes.mend_angles(group.table)
+            attitudes.mend_angles(group.table, source)
     return groups, replace(source, columns=own, remedy=REMEDY)
 
 
@@ -421,7 +421,6 @@ def _take_attitude(
         return None
     read, why = attitudes.reasons(group.table, R_all)
     t_s, rows_s = group.table["time"], made.rows["t_s"]
-    used = np.isfinite(R_all).all(axis=(1, 2)) & np.isfinite(t_s)
     R_eb = np.full((len(rows_s), 3, 3), np.nan)
     if group is main:
         R_eb = R_all[keep]
@@ -434,7 +433,6 @@ def _take_attitude(
     beyond = ~((t_s >= rows_s[0] - LONGEST_GAP_S) & (t_s <= rows_s[-1] + LONGEST_GAP_S))
     good = accounts.samples(made.ledger, "reference", read, [*why, (beyond, accounts.OUTSIDE)])
     made.ledger.use("reference", int(good.sum()))
-    if not np.any(used):
-        made.repairs.append("the attitude in it is none in any row: not used")
+    if not read.any():
         return None
     return Reference(R_eb, meanings.reference, f"attitude in {source.path.name}")
