@@ -89,6 +89,8 @@ class _Log:
             raise LogError(f"{path}: cannot be read as a ULog file: {' '.join(str(error).split())}") from error
         self.topics: dict[tuple[str, int], Topic] = {}
         for topic in self._log.data_list:
+            if "timestamp" not in topic.data:  # pyulog reads nothing behind its first message
+                raise LogError(f"{path}: the definition of topic {topic.name} has no timestamp: it is damaged")
             self.topics.setdefault((topic.name, topic.multi_id), topic.data)
         self.others = list[str]()
         changes = self._log.changed_parameters
@@ -104,7 +106,8 @@ class _Log:
         for name in ("vehicle_gps_position", "sensor_gps"):
             topic = self.topics.get((name, 0), {})
             if {"vel_n_m_s", "vel_e_m_s", "fix_type"} <= set(topic):
-                fast = np.hypot(topic["vel_n_m_s"], topic["vel_e_m_s"]) > FLYING_M_S
+                with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+                    fast = np.hypot(topic["vel_n_m_s"], topic["vel_e_m_s"]) > FLYING_M_S
                 flying = fast & (topic["fix_type"] >= FIX_3D)
                 return float(topic["timestamp"][np.argmax(flying)]) if flying.any() else np.inf
         return np.inf
