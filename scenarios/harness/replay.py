@@ -205,7 +205,7 @@ def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bo
         return np.zeros(len(rows), np.bool_), "the log holds no attitude to score against: --reference FILE"
     judged = reference.known
     if not judged.any():
-        return judged, f"{reference.name} has no attitude at the times of the log; are their clocks the same?"
+        return judged, _why_unknown(log, reference.name)
     if reference.kind == "firmware":
         return judged, ""
     if "gps" in log.instruments and window.airborne_m_s > 0.0:
@@ -221,6 +221,15 @@ def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bo
     if judged.any():
         judged &= rows["t_s"] > rows["t_s"][np.argmax(judged)] + window.settle_s
     return judged, f"what could be judged ends within the {window.settle_s:g} s to settle; choose a shorter --settle"
+
+
+def _why_unknown(log: RecordedLog, name: str) -> str:
+    """Why a reference has no attitude in any row."""
+    entry = log.ledger.get("reference")
+    if entry is None or entry.used or not entry.left_out:
+        return f"{name} has no attitude at the times of the log; are their clocks the same?"
+    reasons = ", ".join(f"{n} {reason}" for reason, n in entry.left_out.items())
+    return f"{name}: none of it can be used, {reasons}"
 
 
 def flying(rows: NDArray[Any], airborne_m_s: float) -> NDArray[np.bool_]:

@@ -173,3 +173,28 @@ def test_replay_of_an_estimator_that_fails_is_exit_code_1(here: Path, capsys) ->
     assert run(["replay", "flown/turns_180-premerlani-seed1", "--estimator", "own.py:Clumsy", "--no-rerun"]) == 1
     assert re.search(r"Clumsy failed: Clumsy at 0\.02 s: ZeroDivisionError", capsys.readouterr().out)
     assert (here / "flights" / "replay_turns_180-premerlani-seed1-Clumsy" / "flight.parquet").is_file()
+
+
+@pytest.mark.parametrize(
+    ("roll", "said"),
+    [
+        (np.nan, "2000 without a number"),
+        (np.inf, "2000 without a number"),
+        (0.0, "2000 of a filter that had not started"),
+    ],
+)
+def test_replay_against_an_attitude_of_which_nothing_can_be_used_is_exit_code_1(
+    tmp_path: Path, monkeypatch, capsys, roll, said
+) -> None:
+    """Columns of an attitude are one to judge by; the reason is that of the ledger, and stands once."""
+    monkeypatch.chdir(tmp_path)
+    n = 2000
+    columns = {"time_s": 0.02 * np.arange(n), **{f"gyro_{a}_rad_s": np.zeros(n) for a in "xyz"}}
+    columns |= {"force_x_m_s2": np.zeros(n), "force_y_m_s2": np.zeros(n), "force_z_m_s2": np.full(n, -9.8)}
+    columns |= {"roll": np.full(n, roll), "pitch": np.zeros(n), "yaw": np.zeros(n)}
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in np.column_stack(list(columns.values())).tolist())]
+    Path("log.csv").write_text("\n".join(lines), encoding="utf-8")
+    assert run(["replay", "log.csv", "--estimator", "gyro_only", "--no-rerun"]) == 1
+    out, err = capsys.readouterr()
+    assert out.count(f"nothing judged: attitude in log.csv: none of it can be used, {said}") == 1
+    assert "Warning" not in err

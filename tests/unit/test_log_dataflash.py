@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from scenarios.harness import logs
 from scenarios.harness.cli import run
 from scenarios.harness.logs.recorded import LogError
-from scenarios.harness.replay import replay
+from scenarios.harness.replay import Window, replay, why_none
 
 HEADER = b"\xa3\x95"
 PACKED = {  # character of a format -> as struct packs it, and what a value is multiplied by
@@ -394,3 +394,13 @@ def test_replay_of_the_file_scores_as_the_flight_itself(logged, write, tmp_path,
     assert run(["replay", "flight.BIN", "--imu", "1", "--no-rerun", "--json", "-"]) == 0
     assert json.loads(capfd.readouterr().out)["rotation_rms_deg"] > 2.0 * data["rotation_rms_deg"]
     assert run(["replay", "flight.BIN", "--imu", "2", "--no-rerun"]) == 2
+
+
+def test_attitude_without_a_number_is_one_that_cannot_be_judged(logged, write):
+    """The log has one: all of it is in the ledger, and the reason is said; it is not as if there had been none."""
+    told = [(t, n, (*v[:7], *4 * [np.nan]) if n == "SIM" else v) for t, n, v in messages(logged, without="ATT")]
+    log = write(Writer(TODAY).log(told))
+    entry = log.ledger["reference"]
+    assert (entry.read, entry.used, entry.left_out) == (len(logged.t_us), 0, {"no attitude": len(logged.t_us)})
+    said = f"SIM in flight.BIN: none of it can be used, {len(logged.t_us)} no attitude"
+    assert why_none(log, Window()) == said

@@ -40,6 +40,11 @@ WITHOUT_TIME = (
 @pytest.mark.parametrize(
     ("name", "raw", "said"),
     [
+        ("a.csv", b"<!DOCTYPE html><html></html>", r"not text in columns; this is a web page, not a log"),
+        ("a.txt", TEXT_LOG, r"not text in columns; this is an ArduPilot log as text \(\.log\): replay the \.bin"),
+        ("a.csv", ULOG, r"not text in columns; this is a ULog file of PX4: name it \.ulg$"),
+        ("a.mat", b"PK\x03\x04" + bytes(600), r"not a MATLAB file; this is a zip archive: unpack it first$"),
+        ("a.mat", b"", r"not a MATLAB file; this is an empty file$"),
         ("a.bin", b"", r"the file is empty, not an ArduPilot DataFlash log \(\.bin\)$"),
         ("a.ulg", b"", r"the file is empty, not a ULog file of PX4 \(\.ulg\)$"),
         ("a.bin", ULOG, r"not an ArduPilot DataFlash log \(\.bin\); this is a ULog file of PX4: name it \.ulg$"),

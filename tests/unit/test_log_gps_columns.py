@@ -191,3 +191,37 @@ def test_force_in_counts_is_refused_with_the_way_out(held, read):
     counts = {f"a{a}": np.round(2048.0 / 9.80665 * held.force[:, i]) for i, a in enumerate("xyz")}
     with pytest.raises(LogError, match=r"2048\.02 m/s\^2 is its median.*counts need a factor in a column map"):
         read(counts)
+
+
+@pytest.mark.parametrize(
+    ("instruments", "said"),
+    [
+        ("gps_latency_s = 0.45", True),
+        ("gps_latency_s = 0.45\ngps_stamped = false", False),
+        ("gps_latency_s = 0.45\ngps_stamped = true", False),
+        ("gps_rate_hz = 4", False),
+    ],
+)
+def test_latency_of_a_map_beside_stamps_is_said_to_give_way(held, read, instruments, said):
+    """Nobody writes it and wonders why it changes nothing: by its stamps a fix is 0.24 s late."""
+    at, vn, ve = fixes(held.n)
+    stamp = np.full(held.n, np.nan)
+    stamp[at] = held.t_s[at] - 0.24
+    notes = read({"vn": vn, "ve": ve, "gps_t_s": stamp}, f"[instruments]\n{instruments}\n").notes
+    assert len(notes) == said
+    assert all("gps_latency_s = 0.45 s in the map" in note and "0.24 s late" in note for note in notes)
+    assert read({"vn": vn, "ve": ve}, "[instruments]\ngps_latency_s = 0.45\n").notes == ()
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e200])
+def test_number_that_no_sensor_reads_is_none(held, read, value):
+    """In one fix and one sample of the gyro, which are left out and counted; no arithmetic overflows."""
+    at, vn, ve = fixes(held.n)
+    vn[at[3]] = value
+    gyro = held.rate[:, 0].copy()
+    gyro[200] = value
+    log = read({"vn": vn, "ve": ve, "gx": gyro})
+    assert len(log.rows) == held.n - 1
+    assert log.ledger["imu"].left_out == {"without a number": 1}
+    assert log.ledger["gps"].left_out == {"without a number": 1}
+    assert all(entry.agrees for entry in log.ledger.values())

@@ -92,6 +92,42 @@ def test_reference_is_mended_as_a_log_is(held, score, angles, form):
     assert entry.used == held.n
 
 
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
+def test_reference_that_begins_at_zero_is_in_the_unit_in_which_it_can_be_interpolated(
+    held, score, angles, factor, unit
+):
+    """Its span overlaps that of the log in any unit."""
+    more = {name: np.concatenate((v[:1], v)) for name, v in angles.items()}
+    more["t"] = factor * np.concatenate(([0.0], held.t_s))
+    log = score(more)
+    np.testing.assert_allclose(log.reference.R_eb, held.R_eb, rtol=0, atol=1e-8)
+    assert log.repairs == (f"ref.csv: column t (time) in {unit}, not seconds: converted",)
+
+
+def test_reference_with_an_infinite_angle_lacks_that_row_alone(held, score, angles):
+    """It is no number, and says nothing of the unit of the others; between its neighbours within 4e-4 / 4 rad."""
+    log = score(angles | {"roll": np.where(np.arange(held.n) == 50, np.inf, angles["roll"])})
+    np.testing.assert_allclose(log.reference.R_eb, held.R_eb, rtol=0, atol=4e-4)
+    entry = log.ledger["reference"]
+    assert (entry.read, entry.used, entry.left_out) == (held.n, held.n - 1, {"without a number": 1})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda a: a | {"yaw": np.linspace(0.0, 20.0, len(a["t"]))}, "yaw up to 20 may be degrees, or radians counted"),
+        (lambda a: a | {"roll": 100.0 * np.degrees(a["roll"])}, r"roll up to \d+.* is neither radians nor degrees"),
+    ],
+)  # fmt: skip
+def test_angles_whose_unit_cannot_be_found_are_refused_with_what_to_write(score, angles, change, said):
+    """Unless the header names the unit."""
+    changed = change(angles)
+    with pytest.raises(LogError, match=said):
+        score(changed)
+    named = {name if name == "t" else f"{name}_rad": values for name, values in changed.items()}
+    assert score(named).reference is not None
+
+
 @pytest.mark.parametrize("name", ["ref.mat", "X_truth.csv"])
 def test_reference_in_other_files_is_read(held, score, angles, name):
     """A MATLAB file; a name that says that it is the truth."""
@@ -146,6 +182,7 @@ def test_reference_on_another_clock_is_refused_with_both_spans(score, angles, sh
     [
         (lambda a: {"t": a["t"], "foo": a["t"], "roll": a["roll"]}, "no time and attitude in it"),
         (lambda a: {n: v[::50] for n, v in a.items()}, r"its 10 attitudes are 1 s apart; they are interpolated where"),
+        (lambda a: {n: v[:1] for n, v in a.items()}, "one attitude alone, at 0.02 s"),
         (lambda a: {n: np.concatenate((v, v)) for n, v in a.items()}, "runs back from 10 to 0.02 s"),
         (lambda a: a | dict.fromkeys(("roll", "pitch", "yaw"), 0.0 * a["t"]), "no attitude in any of its 500 rows"),
     ],

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from scenarios.harness import logs
 from scenarios.harness.cli import run
 from scenarios.harness.logs.recorded import LogError
-from scenarios.harness.replay import replay
+from scenarios.harness.replay import Window, replay, why_none
 
 PACKED = {"uint8_t": "B", "int32_t": "i", "uint32_t": "I", "uint64_t": "Q", "float": "f", "double": "d", "bool": "?"}
 TODAY = {
@@ -38,6 +38,7 @@ RESOLUTION = {
     "gps_v_e_m_s": 2e-6, "gps_p_e_m": 1e-3, "airspeed_m_s": 4e-6, "baro_height_m": 7e-5,
 }  # fmt: skip
 Message = tuple[int, str, int, tuple[Any, ...]]  # time, topic, instance, fields
+FIX_BYTES = 3 + 2 + struct.calcsize("<QQdddfffffB?")  # of a message, with its header and the number of its topic
 SYNC = b"\x2f\x73\x13\x20\x25\x0c\xbb\x12"
 
 
@@ -357,3 +358,35 @@ def test_replay_of_the_file_scores_as_the_flight_itself(logged, write, tmp_path,
     assert (data["rows"], data["reference_kind"]) == (1000, "truth")
     assert run(["replay", "flight.ulg", "--imu", "1", "--no-rerun", "--json", "-"]) == 0
     assert json.loads(capfd.readouterr().out)["rotation_rms_deg"] > 2.0 * data["rotation_rms_deg"]
+
+
+def test_attitude_without_a_number_is_one_that_cannot_be_judged(logged, write):
+    """The log has one: all of it is in the ledger, and the reason is said; it is not as if there had been none."""
+    told = [
+        (t, n, i, (*v[:2], *4 * [np.nan]) if "attitude" in n else v) for t, n, i, v in messages(logged)
+    ]  # fmt: skip
+    log = write(ulog(told))
+    entry = log.ledger["reference"]
+    assert (entry.read, entry.used, entry.left_out) == (len(logged.t_us), 0, {"no attitude": len(logged.t_us)})
+    said = f"vehicle_attitude_groundtruth in flight.ulg: none of it can be used, {len(logged.t_us)} no attitude"
+    assert why_none(log, Window()) == said
+
+
+def test_topic_whose_definition_lost_its_time_is_refused_by_name(logged, write):
+    """One damaged byte in the header: nothing behind it can be placed."""
+    records = ulog(messages(logged))
+    head = records[0].replace(b"vehicle_magnetometer:uint64_t timestamp;", b"vehicle_magnetometer:uint64_t timestamq;")
+    assert head != records[0]
+    with pytest.raises(LogError, match=r"the definition of topic vehicle_magnetometer has no timestamp: it is damaged"):
+        write([head, *records[1:]])
+
+
+def test_fix_with_a_signalling_nan_is_one_without_a_number(logged, write):
+    """As damaged bytes make it: no warning of the arithmetic, and the fix is in the ledger."""
+    records = ulog(messages(logged))
+    signalling = struct.pack("<I", 0x7F800001)
+    k = next(i for i, r in enumerate(records) if i and len(r) == FIX_BYTES)
+    north = FIX_BYTES - 2 - 5 * 4 + 4  # behind the speed: vel_n, vel_e, vel_d, course, then two bytes
+    records[k] = records[k][:north] + signalling + records[k][north + 4 :]
+    entry = write(records).ledger["gps"]
+    assert (entry.read, entry.left_out) == (len(logged.fix_us), {"without a number": 1})

@@ -9,11 +9,14 @@ from scipy.spatial.transform import Rotation, Slerp  # type: ignore[import-untyp
 from estimator.interface import Array
 from estimator.rotation import from_euler
 from estimator.screening import LONGEST_GAP_S
-from scenarios.harness.logs import accounts
+from scenarios.harness.logs import accounts, checks
 from scenarios.harness.logs.quantities import EULER, MATRIX, QUATERNION
+from scenarios.harness.logs.recorded import LogError
 
 NOT_STARTED = "of a filter that had not started"
 NO_ROTATION = "no rotation"
+MOST_DEG = 360.0  # a roll or pitch beyond this is no angle in degrees
+_SAY_UNIT = 'write the unit into the header or a column map: "roll_deg", "yaw_rad"'
 Table = dict[str, Array]
 
 
@@ -31,6 +34,7 @@ def attitude(table: Mapping[str, Array]) -> Array | None:
     if not names:
         return None
     values = np.column_stack([table[name] for name in names])
+    values = np.where(np.isinf(values), np.nan, values)
     if names == MATRIX:
         R_eb = values.reshape(-1, 3, 3)
         known = np.abs(R_eb @ R_eb.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < 0.1
@@ -58,16 +62,36 @@ def reasons(table: Mapping[str, Array], R_eb: Array) -> tuple[NDArray[np.bool_],
     return np.asarray(np.isfinite(values).any(axis=1)), why
 
 
-def mend_angles(table: Table) -> bool:
-    """Convert angles without a given unit from degrees where they exceed what radians can be; whether they did."""
+def mend_angles(table: Table, source: checks.Source) -> bool:
+    """Convert angles without a given unit from degrees where they exceed what radians can be; whether they did.
+
+    Raises
+    ------
+    LogError      angles that are neither, or a yaw that may be degrees or radians counted on over whole turns
+    """
     if not all(name in table for name in EULER):
         return False
-    roll, pitch, yaw = (np.nanmax(np.abs(table[name]), initial=0.0) for name in EULER)
-    if roll <= 3.2 and pitch <= 1.6 and yaw <= 6.4:
+    largest = {name: float(np.nanmax(np.abs(table[name]), initial=0.0)) for name in EULER}
+    steep = largest["roll"] > 3.2 or largest["pitch"] > 1.6
+    if not steep and largest["yaw"] <= 6.4:
         return False
+    for name in ("roll", "pitch"):
+        if largest[name] > MOST_DEG:
+            raise LogError(f"{source.path}: {name} up to {largest[name]:g} is neither radians nor degrees; {_SAY_UNIT}")
+    if not steep and _may_be_turns(table["yaw"]):
+        raise LogError(
+            f"{source.path}: yaw up to {largest['yaw']:g} may be degrees, or radians counted on over whole turns; "
+            f"{_SAY_UNIT}"
+        )
     for name in EULER:
         table[name] = np.radians(table[name])
     return True
+
+
+def _may_be_turns(yaw: Array) -> bool:
+    """Whether a yaw may be radians that were counted on: from within a turn on, and never back by a whole one."""
+    yaw = yaw[np.isfinite(yaw)]
+    return bool(abs(yaw[0]) <= 6.4 and np.all(np.abs(np.diff(yaw)) < np.pi))
 
 
 def at_times(t_s: Array, R_eb: Array, times_s: Array) -> Array:

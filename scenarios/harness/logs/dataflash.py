@@ -211,7 +211,11 @@ class _Log:
         return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"{records.name}.U is 0: not in use"), {}
 
     def attitude(self) -> tuple[Stream | None, Kind]:
-        """The attitude: the simulator's where there is one, else what was flown on, else that of the other filter."""
+        """The attitude: the simulator's where there is one, else what was flown on, else that of the other filter.
+
+        Where none of them has a number, the first one that was logged.
+        """
+        empty: tuple[Stream | None, Kind] = None, "filter"
         for name, kind in ATTITUDES:
             for columns, ours in ((("Q1", "Q2", "Q3", "Q4"), ("qw", "qx", "qy", "qz")),
                                   (("Roll", "Pitch", "Yaw"), ("roll", "pitch", "yaw"))):  # fmt: skip
@@ -222,10 +226,14 @@ class _Log:
                 stream = self.made(records, columns)
                 values = stream.values if ours[0] == "qw" else np.radians(stream.values)
                 R_eb = tabular.attitude(dict(zip(ours, values.T, strict=True)))
-                if R_eb is not None and np.isfinite(R_eb).any():
-                    return Stream(stream.name, stream.t_s, R_eb.reshape(-1, 9), stream.why), kind
+                if R_eb is None:
+                    break
+                attitude = Stream(stream.name, stream.t_s, R_eb.reshape(-1, 9), stream.why)
+                if np.isfinite(R_eb).any():
+                    return attitude, kind
+                empty = empty if empty[0] else (attitude, kind)
                 break
-        return None, "filter"
+        return empty
 
 
 def _at_times(stream: Stream, t_s: Array) -> Stream:

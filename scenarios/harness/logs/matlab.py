@@ -13,7 +13,7 @@ import numpy as np
 from scipy.io import loadmat  # type: ignore[import-untyped]
 
 from estimator.interface import Array
-from scenarios.harness.logs import ardupilot_matlab, dataflash, tabular
+from scenarios.harness.logs import ardupilot_matlab, dataflash, foreign, tabular
 from scenarios.harness.logs.checks import Source
 from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
 from scenarios.harness.logs.column_names import automatic
@@ -69,6 +69,9 @@ def _content(path: Path) -> dict[str, Any]:
     try:
         content = {name: v for name, v in loadmat(path, squeeze_me=True).items() if not name.startswith("__")}
     except Exception as error:  # scipy raises whatever its parser meets in a file cut off or foreign
+        found = foreign.hint(head) if head else "an empty file"
+        if found and not head.startswith(b"MATLAB"):
+            raise LogError(f"{path}: not a MATLAB file; this is {found}") from error
         raise LogError(f"{path}: cannot be read as a MATLAB file: {' '.join(str(error).split())}") from error
     objects = [name for name, v in content.items() if type(v).__name__ in ("MatlabOpaque", "MatlabFunction")]
     if objects and not any(np.asarray(v).dtype.kind in "fiubV" for n, v in content.items() if n not in objects):

@@ -65,7 +65,9 @@ def of_table(
     ledger.use("reference", int(good.sum()))
     found_R_eb = attitudes.at_times(t_s[keep], R_eb[keep], rows_s)
     if not np.isfinite(found_R_eb).any():
-        usual_s = float(np.median(np.diff(t_s[keep]))) if len(keep) > 1 else 0.0
+        if len(keep) == 1:
+            raise LogError(f"{path}: one attitude alone, at {first:.10g} s: there is none to interpolate to")
+        usual_s = float(np.median(np.diff(t_s[keep])))
         raise LogError(
             f"{path}: its {len(keep)} attitudes are {usual_s:.3g} s apart; they are interpolated where they are at "
             f"most {LONGEST_GAP_S:g} s apart, and no row of the log lies there"
@@ -84,22 +86,27 @@ def _in_order(t_s: Array, known: NDArray[np.intp], source: checks.Source, repair
 
 
 def _factor(t_s: Array, rows_s: Array, source: checks.Source, repairs: list[str]) -> float:
-    """Factor to seconds: 1 where the spans overlap or none else does better."""
+    """Factor to seconds: of the first unit in which the spans overlap and attitudes are near enough to each other.
+
+    A record that begins at zero overlaps in any unit: then it is in the one in which it can be interpolated.
+    """
     t_s = t_s[np.isfinite(t_s)]
     if not len(t_s):
         raise source.refusal(None, "time", "no number in it")
     step_s, length_s = float(np.median(np.diff(np.sort(t_s)))) if len(t_s) > 1 else 0.0, float(rows_s[-1] - rows_s[0])
+    found: list[tuple[float, str]] = []
     for factor, name in _UNITS:
         first, last = factor * float(t_s.min()), factor * float(t_s.max())
         if min(last, rows_s[-1]) <= max(first, rows_s[0]):
             continue
-        if factor == 1.0:
-            return factor
         # Times of another clock may overlap in a unit that is not theirs: then they are far too dense and too short.
-        if factor * step_s > 1.0 / checks.FASTEST_HZ and last - first > 0.1 * length_s:
-            repairs.append(f"{source.path.name}: {source.column('time')} in {name}, not seconds: converted")
-            return factor
-    return 1.0
+        if factor == 1.0 or (factor * step_s > 1.0 / checks.FASTEST_HZ and last - first > 0.1 * length_s):
+            found.append((factor, name))
+    near = [unit for unit in found if unit[0] * step_s <= LONGEST_GAP_S]
+    factor, name = next(iter(near or found), _UNITS[0])
+    if factor != 1.0:
+        repairs.append(f"{source.path.name}: {source.column('time')} in {name}, not seconds: converted")
+    return factor
 
 
 def of_log(path: Path, other: RecordedLog, rows_s: Array, ledger: Ledger) -> tuple[Array, Kind]:

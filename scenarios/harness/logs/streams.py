@@ -295,9 +295,9 @@ def _holds(rows: NDArray[Any], fixes: Stream) -> NDArray[np.bool_]:
 def _reference(
     path: Path, messages: Messages, t_s: Array, after_gap: NDArray[np.bool_], books: _Books
 ) -> Reference | None:
-    """The attitude at the times of the rows, interpolated; None where there is none at any of them."""
+    """The attitude at the times of the rows, interpolated; None where none was logged."""
     stream = messages.attitude
-    if stream is None:
+    if stream is None or not len(stream.t_s):
         return None
     good = books.open("reference", stream)
     books.leave_out("reference", good, ~(np.isfinite(stream.t_s) & np.isfinite(stream.values).all(axis=1)), NO_ATTITUDE)
@@ -320,4 +320,4 @@ def _reference(
     books.leave_out("reference", unused, gap, IN_GAP)
     books.leave_out("reference", unused, alone, ALONE)
     books.leave_out("reference", unused, np.ones(len(times), np.bool_), NO_ROW)
-    return Reference(R_eb, messages.kind, f"{stream.name} in {path.name}") if known.any() else None
+    return Reference(R_eb, messages.kind, f"{stream.name} in {path.name}")

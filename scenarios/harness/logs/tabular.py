@@ -28,6 +28,7 @@ from scenarios.harness.logs.validity import usable
 
 Table = dict[str, Array]
 CLIMB_M = 5.0  # a receiver whose height changes by more than this, at no vertical velocity, does not report one
+LARGEST = 1e100  # a number beyond this, or an infinite one, is none: no sensor reads it, and its square overflows
 FEWEST_FORCES = 5  # samples of the gyro for one of the accelerometer, at most
 REMEDY = (
     "where the axes are forward, left, up: --columns forward-left-up; right, forward, up: --columns right-forward-up; "
@@ -87,7 +88,7 @@ def take(
     told: dict[tuple[str, int], set[str]] = {}
     own: dict[str, str] = {}
     for name, m in meanings.columns.items():
-        values = columns[name]
+        values = np.where(np.abs(columns[name]) < LARGEST, columns[name], np.nan)
         part = (of(name), len(values))
         table = parts.setdefault(part, {})
         if m.quantity in table:
@@ -104,7 +105,7 @@ def take(
     for group in groups:
         turn(group, meanings)
         if not group.told & set(EULER):
-            attitudes.mend_angles(group.table)
+            attitudes.mend_angles(group.table, source)
     return groups, replace(source, columns=own, remedy=REMEDY)
 
 
@@ -207,9 +208,24 @@ def recorded(
     place = meanings.origin_deg or made.place
     log = RecordedLog(
         rows, source.path.name, instruments, reference, tuple(repairs), place, known, made.ledger,
-        on_ground=meanings.on_ground,
+        notes=_stamps_first(meanings, known, rows), on_ground=meanings.on_ground,
     )  # fmt: skip
     return checks.judged(log, source)
+
+
+def _stamps_first(meanings: ColumnMap, known: Mapping[str, Known], rows: NDArray[Any]) -> tuple[str, ...]:
+    """A line where the map names a latency of the receiver, but the fixes have stamps and these come first."""
+    latency, stamped = meanings.known.get("gps_latency_s"), known.get("gps_stamped")
+    if latency is None or latency.source == "withheld" or "gps_stamped" in meanings.known:
+        return ()
+    if stamped is None or not stamped.value:
+        return ()
+    fixes = rows[rows["gps_new"] > 0]
+    late_s = float(np.nanmedian(fixes["t_s"] - fixes["gps_t_s"]))
+    return (
+        f"gps_latency_s = {latency.value:g} s in the map is for fixes without a time stamp: those of gps.time are "
+        f"{late_s:.3g} s late; gps_stamped = false in the map, or --set gps_latency_s, lets it hold for all",
+    )
 
 
 def _main(groups: list[Group], source: checks.Source) -> Group:
@@ -421,7 +437,6 @@ def _take_attitude(
         return None
     read, why = attitudes.reasons(group.table, R_all)
     t_s, rows_s = group.table["time"], made.rows["t_s"]
-    used = np.isfinite(R_all).all(axis=(1, 2)) & np.isfinite(t_s)
     R_eb = np.full((len(rows_s), 3, 3), np.nan)
     if group is main:
         R_eb = R_all[keep]
@@ -434,7 +449,6 @@ def _take_attitude(
     beyond = ~((t_s >= rows_s[0] - LONGEST_GAP_S) & (t_s <= rows_s[-1] + LONGEST_GAP_S))
     good = accounts.samples(made.ledger, "reference", read, [*why, (beyond, accounts.OUTSIDE)])
     made.ledger.use("reference", int(good.sum()))
-    if not np.any(used):
-        made.repairs.append("the attitude in it is none in any row: not used")
+    if not read.any():
         return None
     return Reference(R_eb, meanings.reference, f"attitude in {source.path.name}")

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.interface import Array
-from scenarios.harness.logs import units
+from scenarios.harness.logs import foreign, units
 from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.recorded import LogError
 
@@ -109,6 +109,8 @@ def _text(path: Path) -> str:
             raw = gzip.decompress(raw)
         if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
             return raw.decode("utf-16")
+        if found := foreign.hint(raw):
+            raise LogError(f"{path}: not text in columns; this is {found}")
         if b"\0" in raw[:1000]:
             raise LogError(f"{path}: cannot be read as text: there are zero bytes in it")
         try:

@@ -89,6 +89,8 @@ class _Log:
             raise LogError(f"{path}: cannot be read as a ULog file: {' '.join(str(error).split())}") from error
         self.topics: dict[tuple[str, int], Topic] = {}
         for topic in self._log.data_list:
+            if "timestamp" not in topic.data:  # pyulog reads nothing behind its first message
+                raise LogError(f"{path}: the definition of topic {topic.name} has no timestamp: it is damaged")
             self.topics.setdefault((topic.name, topic.multi_id), topic.data)
         self.others = list[str]()
         changes = self._log.changed_parameters
@@ -104,7 +106,8 @@ class _Log:
         for name in ("vehicle_gps_position", "sensor_gps"):
             topic = self.topics.get((name, 0), {})
             if {"vel_n_m_s", "vel_e_m_s", "fix_type"} <= set(topic):
-                fast = np.hypot(topic["vel_n_m_s"], topic["vel_e_m_s"]) > FLYING_M_S
+                with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
+                    fast = np.hypot(topic["vel_n_m_s"], topic["vel_e_m_s"]) > FLYING_M_S
                 flying = fast & (topic["fix_type"] >= FIX_3D)
                 return float(topic["timestamp"][np.argmax(flying)]) if flying.any() else np.inf
         return np.inf
@@ -305,12 +308,18 @@ def _height(log: _Log) -> Stream | None:
 
 
 def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
+    """The true attitude, else the one flown on; where neither has a number, the first one that was logged."""
+    empty: tuple[Stream | None, Kind] = None, "filter"
     for name, kind in ATTITUDES:
         found = log.first(name)
         if found is None:
             continue
         quaternion = log.columns(name, found[1], *_each("q", 4))
         R_eb = tabular.attitude(dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)))
-        if R_eb is not None and np.isfinite(R_eb).any():
-            return Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9)), kind
-    return None, "filter"
+        if R_eb is None:
+            continue
+        attitude = Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9))
+        if np.isfinite(R_eb).any():
+            return attitude, kind
+        empty = empty if empty[0] else (attitude, kind)
+    return empty
