@@ -33,7 +33,7 @@ from scenarios.harness.plugins import (
     shared_settings,
     without,
 )
-from scenarios.harness.preflight import prepared
+from scenarios.harness.preflight import prepared, unheard_settings
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, judge
@@ -249,13 +249,32 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     shared = {key: value for key, value in changes.items() if not key.startswith(PREFIX)}
     of_each = shared_settings(names, settings)
     changes_of = {name: shared | {PREFIX + key: value for key, value in of_each[name].items()} for name in names}
-    configs = [prepared(scenario, {**changes_of[name], "estimator": name})[1] for name in names]
+    configs = [prepared(scenario, {**changes_of[name], "estimator": name}, lenient=True)[1] for name in names]
     made = {name: flight_code(of_it).estimator.code for name, of_it in zip(names, configs, strict=True)}
     console.warn_of_faults(scenario, configs[0])
     references = {name: heading_reference_of(estimator) for name, estimator in made.items()}
     instruments = {name: given(estimator, configs[0]) for name, estimator in made.items()}
-    notes = tuple(without(of_each, settings))
+    notes = (*without(of_each, settings), *_unheard(names, configs))
     return Plan(scenario, find(scenario), configs[0], names, tuple(seeds), changes_of, notes, references, instruments)
+
+
+def _unheard(names: Sequence[str], configs: Sequence[FlightConfig]) -> list[str]:
+    """A line for each property of the instruments that is set and that some estimators have no parameter for.
+
+    Raises
+    ------
+    ValueError      one line: one that none of them has, nor the autopilot
+    """
+    lines = []
+    unheard = {name: unheard_settings(config) for name, config in zip(names, configs, strict=True)}
+    for setting in configs[0].instruments:
+        deaf = [name for name in names if setting in unheard[name]]
+        if len(deaf) == len(names):
+            raise ValueError(f"{setting} = {configs[0].instruments[setting]!r}: none of them has such a parameter")
+        if deaf:
+            takers = ", ".join(name for name in names if name not in deaf)
+            lines.append(f"{setting} is set for {takers}; without that parameter: {', '.join(deaf)}")
+    return lines
 
 
 def _can_be_loaded(name: str) -> bool:

@@ -134,10 +134,9 @@ def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[s
     short = {spec: spec.rpartition(":")[2] for spec in specs}
     of_each: dict[str, dict[str, Any]] = {spec: {} for spec in specs}
     has = {spec: parameters_of(spec) for spec in specs} if settings else {}
+    own = {key: key.partition(".") for key in settings if key.partition(".")[0] in short.values() and "." in key}
     for key, value in settings.items():
-        head, _, rest = key.partition(".")
-        if rest and head in short.values():
-            of_each[next(spec for spec in specs if short[spec] == head)][rest] = value
+        if key in own:
             continue
         takers = [spec for spec in specs if key in has[spec]]
         if not takers:
@@ -147,6 +146,8 @@ def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[s
             raise ValueError(f"unknown parameter {key!r} of {who}: {hint}")
         for spec in takers:
             of_each[spec][key] = value
+    for key, (head, _, rest) in own.items():  # after those for all: what is set for one estimator wins
+        of_each[next(spec for spec in specs if short[spec] == head)][rest] = settings[key]
     return of_each
 
 

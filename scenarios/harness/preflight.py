@@ -11,8 +11,10 @@ from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 
 
-def prepared(name: str, changes: Mapping[str, Any]) -> tuple[Scenario, FlightConfig]:
+def prepared(name: str, changes: Mapping[str, Any], *, lenient: bool = False) -> tuple[Scenario, FlightConfig]:
     """The scenario `name` and its configuration with `changes`, resolved; everything that they name is there.
+
+    lenient : accept a property of the instruments that is set and that no flight code has a parameter for
 
     Raises
     ------
@@ -22,5 +24,16 @@ def prepared(name: str, changes: Mapping[str, Any]) -> tuple[Scenario, FlightCon
     config = resolve(override(scenario.config, changes))
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
-    flight_code(config)
+    unheard = unheard_settings(config)
+    if unheard and not lenient:
+        raise ValueError(
+            f"{unheard[0]} = {config.instruments[unheard[0]]!r}: neither estimator {config.estimator} nor autopilot "
+            f"{config.autopilot} has a parameter of that name"
+        )
     return scenario, config
+
+
+def unheard_settings(config: FlightConfig) -> list[str]:
+    """Properties of the instruments that are set under the resolved `config` and that no flight code is given."""
+    code = flight_code(config)
+    return [name for name in config.instruments if name not in code.estimator.known | code.autopilot.known]

@@ -8,10 +8,12 @@ import pytest
 
 from estimator import ESTIMATORS
 from estimator.instruments import BOOLEAN, PROPERTIES, Instruments, Known
+from scenarios.harness import compare
 from scenarios.harness.aboard import instruments_of
 from scenarios.harness.config import override, resolve
 from scenarios.harness.flight import fly_scenario
-from scenarios.harness.plugins import equipped, equipped_autopilot
+from scenarios.harness.plugins import equipped, equipped_autopilot, shared_settings
+from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find
 from sim.params import dotted_fields
 from sim.sensors.fitting import SUITES
@@ -161,3 +163,28 @@ def test_flight_from_python_knows_its_instruments_and_keeps_them():
     assert manifests[0]["known_to_estimator"] == manifests[1]["known_to_estimator"]
     assert manifests[0]["known_to_estimator"]["gps_latency_s"] == {"value": 0.2, "source": "data sheet"}
     assert manifests[0]["known"].keys() == set(PROPERTIES)
+
+
+@pytest.mark.parametrize(("estimator", "setting"), [("premerlani", "gps_rate_hz"), ("gyro_only", "gps_latency_s")])
+def test_property_that_is_set_and_that_nobody_takes_is_refused(estimator, setting):
+    """Before anything is flown: a setting is never accepted and then ignored.  One that the autopilot takes is fine."""
+    with pytest.raises(ValueError, match=f"{setting} = 0.5: neither estimator {estimator} nor autopilot dcm has"):
+        prepared("turns_180", {"estimator": estimator, setting: 0.5})
+    _, config = prepared("turns_180", {"estimator": estimator, "gps_filter_s": 0.5})
+    assert config.instruments == {"gps_filter_s": 0.5}
+
+
+def test_property_set_for_a_comparison_goes_to_those_that_have_it_and_a_note_lists_the_others():
+    """And is refused where none has it."""
+    plan = compare.prepare("turns_180", ["premerlani", "gyro_only"], [0], {"gps_latency_s": 0.6})
+    assert plan.notes == ("gps_latency_s is set for premerlani; without that parameter: gyro_only",)
+    with pytest.raises(ValueError, match=r"gps_latency_s = 0\.6: none of them has such a parameter"):
+        compare.prepare("turns_180", ["gyro_only"], [0], {"gps_latency_s": 0.6})
+
+
+def test_setting_for_one_estimator_wins_over_one_for_all_in_any_order():
+    """The more particular one."""
+    for names in (("ins_ekf.gps_latency_s", "gps_latency_s"), ("gps_latency_s", "ins_ekf.gps_latency_s")):
+        values = {"ins_ekf.gps_latency_s": 0.6, "gps_latency_s": 0.1}
+        of_each = shared_settings(["ins_ekf", "premerlani"], {name: values[name] for name in names})
+        assert of_each == {"ins_ekf": {"gps_latency_s": 0.6}, "premerlani": {"gps_latency_s": 0.1}}
