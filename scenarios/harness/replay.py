@@ -25,6 +25,7 @@ from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
 from scenarios.harness import console
 from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
+from scenarios.harness.logs.validity import INTERVALS, LONGEST_S
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
 from scenarios.harness.plugins import Equipped, equipped, heading_reference_of, learnt
 from sim.acceptance import FlightCodeFailed, estimate_of
@@ -49,7 +50,6 @@ SCORES = (
     "inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg", "heading_rms_deg",
     "rotation_rms_deg", "rotation_max_deg",
 )  # fmt: skip
-LEAST_FRESH_S, FRESH_FIXES = 2.0, 3.0  # a fix is fresh for so long, or for so many intervals between fixes
 SHARE_S, REPEATS = 0.3, 7  # the time is the least of several runs, while they take no longer than this
 
 
@@ -243,7 +243,7 @@ def flying(rows: NDArray[Any], airborne_m_s: float) -> NDArray[np.bool_]:
         return np.zeros(len(rows), np.bool_)
     t_s, fast = rows["t_s"], rows["gps_speed_m_s"][fixes] > airborne_m_s
     interval_s = float(np.median(np.diff(t_s[fixes]))) if len(fixes) > 1 else 0.0
-    fresh_s = max(LEAST_FRESH_S, FRESH_FIXES * interval_s)
+    fresh_s = max(LONGEST_S, INTERVALS * interval_s)
     last = np.searchsorted(fixes, np.arange(len(rows)), side="right") - 1
     before, after = np.maximum(last, 0), np.minimum(last + 1, len(fixes) - 1)
     fresh = t_s - t_s[fixes[before]] <= fresh_s

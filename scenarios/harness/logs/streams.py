@@ -23,10 +23,10 @@ from scenarios.harness.logs.accounts import NO_FIX as NO_FIX
 from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.validity import usable
 
 Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
 SLOWEST_S = 0.1  # an inertial unit logged more slowly is not to be integrated
-LOST_S, LOST_REPORTS = 2.0, 3.0  # a fix no longer holds after this silence, or so many usual intervals, if longer
 CLIMB_M = 5.0  # a receiver whose height changed by more than this, at no vertical velocity, does not report one
 FEW = 0.01  # a share of the fixes below this is damage
 FAR = "at a time far from its neighbours"
@@ -279,17 +279,12 @@ def _put_fixes(ticks: _Ticks, fixes: Stream | None, known: dict[str, Known]) -> 
 
 
 def _holds(rows: NDArray[Any], fixes: Stream) -> NDArray[np.bool_]:
-    """Rows in which the last fix is usable: neither has the receiver lost it since, nor has it been silent for long."""
-    t_s, new = rows["t_s"], rows["gps_new"] > 0
-    fixed = np.maximum.accumulate(np.where(new, np.arange(len(rows)), -1))
-    usual_s = float(np.median(np.diff(t_s[new]))) if new.sum() > 1 else 0.0
-    holds = (fixed >= 0) & (t_s - t_s[fixed] <= max(LOST_S, LOST_REPORTS * usual_s))
-    if fixes.lost is not None and fixes.lost.any():
-        at = np.searchsorted(t_s, fixes.t_s[fixes.lost & np.isfinite(fixes.t_s)])
-        lost = np.full(len(rows), -1)
-        lost[at[at < len(rows)]] = at[at < len(rows)]
-        holds &= fixed >= np.maximum.accumulate(lost)
-    return holds
+    """Rows in which the last fix is usable; see `validity`."""
+    lost = np.zeros(len(rows), np.bool_)
+    if fixes.lost is not None:
+        at = np.searchsorted(rows["t_s"], fixes.t_s[fixes.lost & np.isfinite(fixes.t_s)])
+        lost[at[at < len(rows)]] = True
+    return usable(rows["gps_new"] > 0, rows["t_s"], lost)
 
 
 def _reference(
