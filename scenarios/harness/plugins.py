@@ -179,7 +179,7 @@ def _equipped(
     code = _load(kind, spec, **also, **values, instruments=aboard)
     known = {name: aboard[name] for name in aboard if name in asked or "instruments" in asked}
     params = getattr(code, "params", None)
-    if is_dataclass(params) and inspect.isclass(maker):
+    if is_dataclass(params) and inspect.isclass(maker) and (settings or _takes_params(maker, {*also, *aboard})):
         places = _places(params, aboard)
         known |= {name: aboard[name] for name in aboard if name in places}
         changes = {place: values[name] for name, place in places.items() if name in values} | dict(settings)
@@ -190,6 +190,15 @@ def _equipped(
             "has no dataclass params"
         )
     return Equipped(code, known)
+
+
+def _takes_params(maker: Any, others: set[str]) -> bool:
+    """Whether the constructor's first argument can be the parameters: it is none of the `others`, offered by name."""
+    try:
+        first = next(iter(inspect.signature(maker).parameters), "")
+    except (TypeError, ValueError):
+        return False
+    return bool(first) and first not in {*others, "instruments"}
 
 
 def _places(params: Any, names: Iterable[str]) -> dict[str, str]:

@@ -6,6 +6,8 @@ from importlib import import_module
 
 import pytest
 
+from autopilot.airframes import AutopilotParams
+from autopilot.autopilot import DcmAutopilot
 from estimator import ESTIMATORS
 from estimator.instruments import BOOLEAN, PROPERTIES, Instruments, Known
 from scenarios.harness import compare
@@ -188,3 +190,18 @@ def test_setting_for_one_estimator_wins_over_one_for_all_in_any_order():
         values = {"ins_ekf.gps_latency_s": 0.6, "gps_latency_s": 0.1}
         of_each = shared_settings(["ins_ekf", "premerlani"], {name: values[name] for name in names})
         assert of_each == {"ins_ekf": {"gps_latency_s": 0.6}, "premerlani": {"gps_latency_s": 0.1}}
+
+
+class Patient(DcmAutopilot):
+    """A person's own variant of the autopilot, which chooses its parameters itself."""
+
+    def __init__(self, heading_reference="course", aircraft="endurance"):
+        super().__init__(AutopilotParams(), heading_reference, aircraft)
+
+
+def test_own_autopilot_that_chooses_its_parameters_itself_keeps_them():
+    """Its constructor takes none: it is given none, and says so."""
+    made = equipped_autopilot(f"{__file__}:Patient", "nose", "endurance", aboard("ideal"))
+    assert made.code.params == AutopilotParams()
+    assert made.code.heading_reference == "nose"
+    assert made.known == {}

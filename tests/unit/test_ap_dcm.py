@@ -133,7 +133,7 @@ def test_heading_reference_is_the_nose_where_a_magnetometer_is_known_to_be_fitte
 @pytest.mark.parametrize("value", [0.0, False, 1.0, True])
 def test_use_magnetometer_as_a_record_or_a_command_line_has_it(value):
     """Numbers for truth values: what is known of the instruments comes from files as well."""
-    estimator = equipped("ap_dcm", settings={"use_magnetometer": value}).estimator
+    estimator = equipped("ap_dcm", settings={"use_magnetometer": value}).code
     assert estimator.params.use_magnetometer is bool(value)
     assert estimator.snapshot()["use_magnetometer"][0] == int(value)
 
@@ -275,8 +275,8 @@ def test_quirks_can_be_typed_and_the_original_takes_settings():
     assert ApDcmParams(quirks="JULY_2013").quirks == JULY_2013
     assert ApDcmParams(quirks="").quirks == frozenset()
     assert ApDcm2013().params == ApDcmParams(quirks=JULY_2013)
-    assert make("ap_dcm_2013", {"kp": "0.2"}).estimator.params == ApDcmParams(quirks=JULY_2013, kp=0.2)
-    assert make("ap_dcm", {"quirks": "vertical_clip"}).estimator.params.quirks == {Quirk.VERTICAL_CLIP}
+    assert make("ap_dcm_2013", {"kp": "0.2"}).code.params == ApDcmParams(quirks=JULY_2013, kp=0.2)
+    assert make("ap_dcm", {"quirks": "vertical_clip"}).code.params.quirks == {Quirk.VERTICAL_CLIP}
 
 
 @pytest.mark.parametrize(
