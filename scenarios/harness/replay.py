@@ -225,6 +225,8 @@ def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bo
 
 def _why_unknown(log: RecordedLog, name: str) -> str:
     """Why a reference has no attitude in any row."""
+    if log.reference is not None and log.reference.why_none:
+        return log.reference.why_none
     entry = log.ledger.get("reference")
     if entry is None or entry.used or not entry.left_out:
         return f"{name} has no attitude at the times of the log; are their clocks the same?"

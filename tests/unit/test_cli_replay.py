@@ -198,3 +198,24 @@ def test_replay_against_an_attitude_of_which_nothing_can_be_used_is_exit_code_1(
     out, err = capsys.readouterr()
     assert out.count(f"nothing judged: attitude in log.csv: none of it can be used, {said}") == 1
     assert "Warning" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["--airborne", "50"], "never above 50 m/s over the ground"),
+        (["--settle", "100"], "ends within the 100 s to settle"),
+        (["--reference", "later.csv"], r"later.csv: its times, .* do not overlap those of the log"),
+    ],
+)
+def test_replay_in_which_nothing_is_judged_says_why_and_is_exit_code_1(here: Path, capsys, arguments, why) -> None:
+    """A gate on which nothing was judged must not be open."""
+    (here / "later.csv").write_text("t,roll,pitch,yaw\n" + "".join(f"{1000 + 0.1 * k},0.1,0,0\n" for k in range(50)))
+    capsys.readouterr()
+    command = ["replay", "flown/turns_180-premerlani-seed1", *arguments, "--no-rerun", "--json", "r.json"]
+    assert run(command) == 1
+    assert re.search(f"^nothing judged: .*{why}", capsys.readouterr().out, re.M)
+    data = json.loads((here / "r.json").read_text())
+    assert data["judged_s"] == 0.0
+    assert re.search(why, data["not_judged"])
+    assert all(e["read"] == e["used"] + sum(e["left_out"].values()) for e in data["ledger"].values())

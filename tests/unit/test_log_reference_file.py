@@ -1,5 +1,7 @@
 """A reference in a file of its own passes through the repairs of a log, whatever kind of file it is."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.io import savemat
@@ -7,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from scenarios.harness import logs
 from scenarios.harness.logs.recorded import LogError
+from scenarios.harness.replay import Window, why_none
 from sim import recording
 from sim.log import Flight, Log, Outcome
 
@@ -168,23 +171,23 @@ def test_reference_beyond_the_log_is_left_out_and_counted(held, score, angles):
 
 
 @pytest.mark.parametrize("shift_s", [1000.0, -1000.0, 86400.0])
-def test_reference_on_another_clock_is_refused_with_both_spans(score, angles, shift_s):
+def test_reference_on_another_clock_scores_nothing_and_names_both_spans(score, angles, shift_s):
     """Nobody guesses by how much the clocks differ; no unit is found that would make them meet."""
     first, last = 0.02 + shift_s, 10.0 + shift_s
     said = rf"its times, {first:.10g} to {last:.10g} s, do not overlap those of the log, 0\.02 to 10 s"
-    with pytest.raises(LogError, match=said) as error:
-        score(angles | {"t": angles["t"] + shift_s})
-    assert "\n" not in str(error.value)
+    log = score(angles | {"t": angles["t"] + shift_s})
+    assert not log.reference.known.any()
+    assert re.search(said, why_none(log, Window()))
+    assert "\n" not in why_none(log, Window())
+    entry = log.ledger["reference"]
+    assert (entry.read, entry.used, entry.left_out) == (500, 0, {"outside the times of the log": 500})
 
 
 @pytest.mark.parametrize(
     ("reference", "said"),
     [
         (lambda a: {"t": a["t"], "foo": a["t"], "roll": a["roll"]}, "no time and attitude in it"),
-        (lambda a: {n: v[::50] for n, v in a.items()}, r"its 10 attitudes are 1 s apart; they are interpolated where"),
-        (lambda a: {n: v[:1] for n, v in a.items()}, "one attitude alone, at 0.02 s"),
         (lambda a: {n: np.concatenate((v, v)) for n, v in a.items()}, "runs back from 10 to 0.02 s"),
-        (lambda a: a | dict.fromkeys(("roll", "pitch", "yaw"), 0.0 * a["t"]), "no attitude in any of its 500 rows"),
     ],
 )  # fmt: skip
 def test_reference_that_cannot_be_used_is_refused(score, angles, reference, said):
@@ -193,6 +196,23 @@ def test_reference_that_cannot_be_used_is_refused(score, angles, reference, said
         score(reference(angles))
     assert "ref.csv" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("reference", "said"),
+    [
+        (lambda a: {n: v[::50] for n, v in a.items()}, r"its 10 attitudes are 1 s apart; they are interpolated where"),
+        (lambda a: {n: v[:1] for n, v in a.items()}, "one attitude alone, at 0.02 s"),
+        (lambda a: a | dict.fromkeys(("roll", "pitch", "yaw"), 0.0 * a["t"]), "no attitude in any of its 500 rows"),
+    ],
+)  # fmt: skip
+def test_reference_of_which_nothing_can_be_used_scores_nothing_and_says_why(score, angles, reference, said):
+    """The log is replayed all the same; the books account for every attitude."""
+    log = score(reference(angles))
+    assert not log.reference.known.any()
+    assert re.search(said, why_none(log, Window()))
+    assert log.ledger["reference"].agrees
+    assert log.ledger["reference"].used == 0
 
 
 def test_reference_that_is_not_there_is_refused(score, tmp_path):

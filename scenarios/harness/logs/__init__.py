@@ -7,9 +7,11 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
+
 from scenarios.harness.logs import accounts, checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
-from scenarios.harness.logs.recorded import LogError, RecordedLog
+from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog
 
 _BY_MAP = {  # columns of numbers, which a column map explains
     **dict.fromkeys((".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz"), "text"),
@@ -55,15 +57,22 @@ def _against(log: RecordedLog, path: Path) -> RecordedLog:
     rows_s, ledger, repairs = log.rows["t_s"], accounts.without(log.ledger, "reference"), list(log.repairs)
     reader = _module(path.name.lower(), _BY_MAP)
     kind: reference_file.Kind = "filter"
-    if reader and not vectors.is_reference(path):
-        groups, source, notes = import_module(f"{__name__}.{reader}").groups(path)
-        repairs += [f"{path.name}: {line}" for line in notes]
-        R_eb = reference_file.of_table(path, groups, source, rows_s, ledger, repairs)
-    else:
-        other = read(path)
-        repairs += [f"{path.name}: {line}" for line in other.repairs]
-        R_eb, kind = reference_file.of_log(path, other, rows_s, ledger)
-    found = reference_file.reference(R_eb, kind, path)
+    try:
+        if reader and not vectors.is_reference(path):
+            groups, source, notes = import_module(f"{__name__}.{reader}").groups(path)
+            repairs += [f"{path.name}: {line}" for line in notes]
+            R_eb = reference_file.of_table(path, groups, source, rows_s, ledger, repairs)
+        else:
+            other = read(path)
+            repairs += [f"{path.name}: {line}" for line in other.repairs]
+            R_eb, kind = reference_file.of_log(path, other, rows_s, ledger)
+        found = reference_file.reference(R_eb, kind, path)
+    except NothingToScore as nothing:
+        ledger = accounts.without(log.ledger, "reference")
+        ledger.read("reference", nothing.read)
+        ledger.leave_out("reference", nothing.read, nothing.reason)
+        unknown = np.full((len(rows_s), 3, 3), np.nan)
+        found = replace(reference_file.reference(unknown, kind, path), why_none=str(nothing))
     return replace(log, reference=found, ledger=ledger, repairs=tuple(repairs))
 
 

@@ -16,17 +16,30 @@ class LogError(ValueError):
     """A log that cannot be read or believed; one line that names the file, the line or row, and the column."""
 
 
+class NothingToScore(LogError):
+    """A reference none of which can be used at the times of a log: the log is replayed, and nothing judged.
+
+    read : attitudes in the reference      reason : why they are left out, in a few words
+    """
+
+    def __init__(self, line: str, read: int, reason: str) -> None:
+        super().__init__(line)
+        self.read, self.reason = read, reason
+
+
 @dataclass(frozen=True, slots=True)
 class Reference:
     """The attitude that a log is scored against.
 
     R_eb : shape (N, 3, 3), at the times of the rows, NaN where there is none
     kind : "truth", the output of another "filter", or of the original "firmware"      name : in a few words
+    why_none : one line, where nothing of it can be used
     """
 
     R_eb: Array
     kind: Literal["truth", "filter", "firmware"]
     name: str
+    why_none: str = ""
 
     @property
     def known(self) -> NDArray[np.bool_]:

@@ -14,7 +14,7 @@ from estimator.interface import Array
 from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import accounts, attitudes, checks
 from scenarios.harness.logs.ledger import Ledger
-from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog, Reference
 from scenarios.harness.logs.tabular import Group
 
 _UNITS = ((1.0, "seconds"), (1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
@@ -30,7 +30,8 @@ def of_table(
 
     Raises
     ------
-    LogError      no time and attitude in it, a clock that runs back, or that of another log; one line
+    LogError      no time and attitude in it, a clock that runs back; one line
+    NothingToScore      none of its attitudes is at a time of the log
     """
     found = next((g for g in groups if attitudes.form_of(g.table) and g.has("time")), None)
     R_eb = attitudes.attitude(found.table) if found else None
@@ -41,7 +42,8 @@ def of_table(
     t_s = table["time"]
     known = np.flatnonzero(np.isfinite(R_eb).all(axis=(1, 2)))
     if not len(known):
-        raise LogError(f"{path}: no attitude in any of its {len(t_s)} rows")
+        line = f"{path}: no attitude in any of its {len(t_s)} rows"
+        raise NothingToScore(line, int(read.sum()), accounts.NO_NUMBER)
     factor = _factor(t_s[known], rows_s, source, repairs)
     t_s = factor * t_s
     of_file = checks.Source(path, source.columns, lambda k: source.row(int(known[k])))
@@ -51,10 +53,7 @@ def of_table(
     repairs += [f"{path.name}: {line}" for line in mended]
     first, last = float(t_s[keep[0]]), float(t_s[keep[-1]])
     if first > rows_s[-1] or last < rows_s[0]:
-        raise LogError(
-            f"{path}: its times, {first:.10g} to {last:.10g} s, do not overlap those of the log, {rows_s[0]:.10g} to "
-            f"{rows_s[-1]:.10g} s: put both on one clock"
-        )
+        raise _elsewhere(path, first, last, rows_s, int(read.sum()))
     elsewhere = np.ones(len(t_s), np.bool_)
     elsewhere[keep] = False
     outside = (t_s < rows_s[0] - LONGEST_GAP_S) | (t_s > rows_s[-1] + LONGEST_GAP_S)
@@ -66,13 +65,26 @@ def of_table(
     found_R_eb = attitudes.at_times(t_s[keep], R_eb[keep], rows_s)
     if not np.isfinite(found_R_eb).any():
         if len(keep) == 1:
-            raise LogError(f"{path}: one attitude alone, at {first:.10g} s: there is none to interpolate to")
+            line = f"{path}: one attitude alone, at {first:.10g} s: there is none to interpolate to"
+            raise NothingToScore(line, int(read.sum()), "alone")
         usual_s = float(np.median(np.diff(t_s[keep])))
-        raise LogError(
+        raise NothingToScore(
             f"{path}: its {len(keep)} attitudes are {usual_s:.3g} s apart; they are interpolated where they are at "
-            f"most {LONGEST_GAP_S:g} s apart, and no row of the log lies there"
+            f"most {LONGEST_GAP_S:g} s apart, and no row of the log lies there",
+            int(read.sum()),
+            "too far apart",
         )
     return found_R_eb
+
+
+def _elsewhere(path: Path, first_s: float, last_s: float, rows_s: Array, read: int) -> NothingToScore:
+    """The reference is of another time, or on another clock: nobody guesses by how much."""
+    return NothingToScore(
+        f"{path}: its times, {first_s:.10g} to {last_s:.10g} s, do not overlap those of the log, {rows_s[0]:.10g} to "
+        f"{rows_s[-1]:.10g} s: put both on one clock",
+        read,
+        accounts.OUTSIDE,
+    )
 
 
 def _in_order(t_s: Array, known: NDArray[np.intp], source: checks.Source, repairs: list[str]) -> NDArray[np.intp]:
@@ -118,10 +130,7 @@ def of_log(path: Path, other: RecordedLog, rows_s: Array, ledger: Ledger) -> tup
         raise LogError(f"{path}: no attitude in it")
     t_s, R_eb = t_s[known], other.reference.R_eb[known]
     if t_s[0] > rows_s[-1] or t_s[-1] < rows_s[0]:
-        raise LogError(
-            f"{path}: its times, {t_s[0]:.10g} to {t_s[-1]:.10g} s, do not overlap those of the log, {rows_s[0]:.10g} "
-            f"to {rows_s[-1]:.10g} s: put both on one clock"
-        )
+        raise _elsewhere(path, float(t_s[0]), float(t_s[-1]), rows_s, len(t_s))
     outside = (t_s < rows_s[0] - LONGEST_GAP_S) | (t_s > rows_s[-1] + LONGEST_GAP_S)
     good = accounts.samples(ledger, "reference", np.ones(len(t_s), np.bool_), [(outside, accounts.OUTSIDE)])
     ledger.use("reference", int(good.sum()))
