@@ -187,8 +187,11 @@ def test_rotation_error_any_angle_is_the_geodesic(axis, angle):
     """Exact from a ten-millionth of a radian to half a turn, where an arc cosine of the trace is blind."""
     A = rotations(1)[0]
     B = Rotation.from_rotvec(np.array(axis) / np.linalg.norm(axis) * angle).as_matrix() @ A
-    # Near half a turn round-off e of the cosine's square moves the angle by 2 sqrt(e); nine sums leave e < 2e-15.
-    assert float(rotation.rotation_error_rad(A, B)) == pytest.approx(angle, rel=0, abs=9e-8 if angle > 3.1 else 1e-14)
+    # Round-off e of the square of the half angle's cosine c moves the angle by e / c, at half a turn, where c is 0, by
+    # 2 sqrt(e); nine sums leave e < 2e-15.
+    c = math.cos(0.5 * angle)
+    bound = 1e-14 + min(2e-15 / c if c > 0.0 else math.inf, 9e-8)
+    assert float(rotation.rotation_error_rad(A, B)) == pytest.approx(angle, rel=0, abs=bound)
 
 
 @given(ANGLE, st.floats(-1.4, 1.4), st.floats(-3.0, 3.0), st.one_of(st.floats(0, 3.1), st.floats(0, 1e-7)))
