@@ -125,7 +125,7 @@ class Instruments(Mapping[str, Known]):
     ----------
     known : what is known, by name; a name beside `PROPERTIES` is a parameter of single estimators
     settings : what the user set, by name: it wins over everything else
-    withheld : names of properties that nobody is told
+    withheld : names of properties to hide from flight code
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class Instruments(Mapping[str, Known]):
 
 
 def _without_knowledge(name: str, *, withheld: bool = False) -> Known:
-    """The entry of a property that nobody knows, or is told."""
+    """The entry of a property that is unknown or withheld."""
     assumed = PROPERTIES[name].assumed if name in PROPERTIES else None
     if withheld:
         return Known(assumed, "withheld")

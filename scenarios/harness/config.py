@@ -130,7 +130,7 @@ class FlightConfig(_Model):
     estimator_params : fields of the estimator's parameter dataclass
     instruments : properties of the instruments that the user sets, ``{"gps_latency_s": 1.0}``: they go to every
     estimator and autopilot that has a parameter of that name, instead of the figures of the suite
-    withheld : names of properties that nobody is told, whatever the suite says
+    withheld : names of properties to hide from flight code, whatever the suite says
     duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
     changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
     turn_table : the magnetometer was turned on a table before the flight: an estimator that has a parameter

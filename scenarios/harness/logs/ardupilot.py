@@ -131,7 +131,7 @@ def year_of(fixes: Records) -> float:
 
 
 def _first_flight(log: DataFlash | MatlabMessages) -> int:
-    """Where in the file the first fix of something that flies is; the end where there is none."""
+    """File offset of the first fix in flight; beyond the end of the file if there is none."""
     fixes = log.records("GPS")
     if not {"Status", "Spd"} <= set(fixes.columns):
         return 1 << 62

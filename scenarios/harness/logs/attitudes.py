@@ -26,7 +26,7 @@ def form_of(table: Mapping[str, Array]) -> tuple[str, ...]:
 
 
 def attitude(table: Mapping[str, Array]) -> Array | None:
-    """The attitude that the columns hold, shape (N, 3, 3), NaN where there is none; None without such columns.
+    """The attitude that the columns hold, shape (N, 3, 3), NaN where unknown; None without such columns.
 
     A filter that has not started reports zeros: level and to the north, all three exactly, is no attitude then.
     """

@@ -101,7 +101,7 @@ def _velocity(table: Mapping[str, Array], told: frozenset[str]) -> Array | None:
 def _position(
     table: Mapping[str, Array], told: frozenset[str], good: NDArray[np.bool_], repairs: list[str]
 ) -> tuple[Array, tuple[float, float] | None]:
-    """Position from the first of the `good` reports on, shape (n, 3), NaN where there is none; and where that was."""
+    """Position from the first of the `good` reports on, shape (n, 3), NaN where unknown; and where that was."""
     n = len(good)
     if not ("gps.latitude" in table and "gps.longitude" in table):
         return np.column_stack([table.get(f"gps.{a}", np.zeros(n)) for a in "ned"]), None

@@ -1,11 +1,11 @@
 """What became of everything that a log holds: how much of each stream was read, used, and left out, and why.
 
-A stream is ``imu``, ``gps``, ``magnetometer``, ``airspeed``, ``barometer`` or ``reference``.  Of each one
+A stream is ``imu``, ``gps``, ``magnetometer``, ``airspeed``, ``barometer`` or ``reference``.  For each one
 
     read = used + everything left out
 
-holds: a reader counts what it reads, whoever leaves something out says why, and what estimators are given at the end
-is counted on its own: `Entry.agrees` compares the two.
+Readers count what they read and give a reason for whatever they leave out.  What the estimators receive is counted
+separately, so that `Entry.agrees` can compare the two.
 """
 
 from collections.abc import Mapping

@@ -31,7 +31,7 @@ class NothingToScore(LogError):
 class Reference:
     """The attitude that a log is scored against.
 
-    R_eb : shape (N, 3, 3), at the times of the rows, NaN where there is none
+    R_eb : shape (N, 3, 3), at the times of the rows, NaN where unknown
     kind : "truth", the output of another "filter", or of the original "firmware"      name : in a few words
     why_none : one line, where nothing of it can be used
     """

@@ -24,7 +24,7 @@ Kind = Literal["truth", "filter", "firmware"]
 def of_table(
     path: Path, groups: list[Group], source: checks.Source, rows_s: Array, ledger: Ledger, repairs: list[str]
 ) -> Array:
-    """The attitude in the columns of a file at the times `rows_s` of a log, shape (N, 3, 3), NaN where there is none.
+    """The attitude in the columns of a file at the times `rows_s` of a log, shape (N, 3, 3), NaN where unknown.
 
     groups : columns by our names in our units
 

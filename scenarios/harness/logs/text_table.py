@@ -237,7 +237,7 @@ def _decimal(path: Path, cells: list[list[str]]) -> str:
 
 
 def _numbers(path: Path, column: list[str], name: tuple[str, str], decimal: str, where: Callable[[int], str]) -> Array:
-    """The numbers of a column, NaN where there is none; LogError with line and column elsewhere.
+    """The numbers of a column, NaN where unknown; LogError with line and column elsewhere.
 
     name : of the column, and what to say of a cell that holds something else
     """
