@@ -70,7 +70,7 @@ def make(
 
     Raises
     ------
-    ValueError      no output requested, no recording at that path, no fix for the messages, or a package that is missing
+    ValueError      no output requested, no recording there, no fix for the messages, or a missing package
     """
     if nmea is None and ubx is None and csv is None:
         raise ValueError("nothing to write: name --nmea FILE, --ubx FILE, --csv FILE or several of them")

@@ -112,8 +112,16 @@ def run(
                 viewing.write_rerun(flight, folder)
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
-    notes = tuple(without(of_each, settings))
+    notes = (*without(of_each, settings), *_ground_too(log))
     return Told(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
+
+
+def _ground_too(log: RecordedLog) -> list[str]:
+    """A line where the log has fixes and none of them is usable: nothing then tells flight from ground."""
+    fixes = log.ledger.get("gps")
+    if fixes is None or not fixes.read or fixes.used:
+        return []
+    return ["none of the fixes is usable: all rows are judged, those on the ground too"]
 
 
 def tell(told: Told) -> None:

@@ -219,3 +219,29 @@ def test_replay_in_which_nothing_is_judged_says_why_and_is_exit_code_1(here: Pat
     assert data["judged_s"] == 0.0
     assert re.search(why, data["not_judged"])
     assert all(e["read"] == e["used"] + sum(e["left_out"].values()) for e in data["ledger"].values())
+
+
+def test_replay_of_a_log_without_a_usable_fix_says_that_the_ground_is_judged_too(here: Path, capsys) -> None:
+    """Fixes below three dimensions are left out: no speed says when it flew."""
+    log = recording.load(here / "flown" / "turns_180-premerlani-seed1").log
+    m, R = log.measured, log.truth["R_eb"].reshape(-1, 9)
+    header = [
+        "t",
+        "gx",
+        "gy",
+        "gz",
+        "ax",
+        "ay",
+        "az",
+        "vn",
+        "ve",
+        "gps_fix",
+        *(f"r{i}{j}" for i in range(3) for j in range(3)),
+    ]
+    v_e, fix = m["gps_v_e_m_s"][:, :2], np.full(len(m), 2.0)
+    numbers = np.column_stack((m["t_s"], m["gyro_b_rad_s"], m["force_b_m_s2"], v_e, fix, R))
+    np.savetxt(here / "no_fix.csv", numbers, delimiter=",", header=",".join(header), comments="", fmt="%.12g")
+    capsys.readouterr()
+    assert run(["replay", "no_fix.csv", "--estimator", "gyro_only", "--no-rerun", "--json", "r.json"]) == 0
+    assert "none of the fixes is usable: all rows are judged" in capsys.readouterr().out
+    assert json.loads((here / "r.json").read_text())["judged_s"] > 5.0
