@@ -382,7 +382,7 @@ def tell(comparison: Comparison) -> None:
         )
     )
     for line in comparison.notes:
-        out.print(Text(f"set         {line}"), soft_wrap=True)
+        out.print(Text(f"note        {line}"), soft_wrap=True)
     console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
         for flown in entrant.flights:

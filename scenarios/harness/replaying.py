@@ -134,7 +134,7 @@ def tell(told: Told) -> None:
     for line in log.repairs:
         out.print(Text(f"repaired    {line}", "yellow"), soft_wrap=True)
     for line in told.notes:
-        out.print(Text(f"set         {line}"), soft_wrap=True)
+        out.print(Text(f"note        {line}"), soft_wrap=True)
     if len(log.ledger):
         columns = ("", "read", "used", "left out")
         out.print(console.table("samples in the log", columns, _books(log), text=(0, 3), wrapping=(3,)))

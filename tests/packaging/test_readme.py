@@ -116,6 +116,15 @@ def test_readme_verdict_shows_the_checks_and_limits_of_the_scenario() -> None:
     assert rows == [(check.name, f"{check.sense} {limit:.2f}") for check, limit in zip(checks, limits, strict=True)]
 
 
+@pytest.mark.usefixtures("here")
+def test_readme_verdict_shows_what_the_estimator_is_given(capsys) -> None:
+    """The lines about the instruments are those that the command prints."""
+    run(["fly", "hand_launch", "--duration", "1", "--no-rerun"])
+    printed = re.search(r"^known .*?(?=^recording)", capsys.readouterr().out, re.M | re.S)
+    assert printed
+    assert printed[0] in README
+
+
 def test_readme_options_of_the_gate_exist(here: Path) -> None:
     """The command that gates a build writes the three reports that it names."""
     (command,) = (c for c in commands() if c.startswith("wingslevel check --seeds 0-9"))
