@@ -123,6 +123,7 @@ def test_readme_verdict_shows_what_the_estimator_is_given(capsys) -> None:
     printed = re.search(r"^known .*?(?=^recording)", capsys.readouterr().out, re.M | re.S)
     assert printed
     assert printed[0] in README
+    assert printed[0] in (ROOT / "docs" / "instruments.md").read_text(encoding="utf-8")
 
 
 def test_readme_options_of_the_gate_exist(here: Path) -> None:
