@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help venv fly test lint clean
+.PHONY: help venv fly test proofs lint clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
@@ -34,6 +34,9 @@ lint: venv  ## style, types, layers
 
 test: lint  ## set up, lint, and run all tests
 	$(BIN)/pytest -n $(WORKERS)
+
+proofs: venv  ## the long proofs: hundreds of command lines, kills and bent files
+	$(BIN)/pytest -n $(WORKERS) -m long
 
 clean:  ## remove what was made here, the virtual environment included
 	rm -rf $(VENV) flights dist build .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -15,6 +15,8 @@ from autopilot.interface import ActuatorCommand, Autopilot, Mode, Setpoint
 from estimator.interface import Array, AttitudeEstimate, AttitudeEstimator, Health, Measurements
 from estimator.jit import kernel
 from sim.log import Outcome
+from sim.signals import Interrupted, TimedOut, check
+from sim.wording import described, printable
 
 N_HEALTH, N_MODES = len(Health), len(Mode)
 ROTATION_TOLERANCE = 1e-2  # largest |R R^T - I| that is still taken for a rotation
@@ -123,14 +125,16 @@ def blaming(outcome: Outcome, who: object, t_s: float) -> Iterator[None]:
     """Turn whatever `who` raises inside the block into a FlightCodeFailed: it is a result of the flight."""
     try:
         yield
-    except Exception as error:
+    except BaseException as error:
         raise _failure(outcome, who, t_s, error) from error
 
 
-def _failure(outcome: Outcome, who: object, t_s: float, error: Exception) -> FlightCodeFailed:
-    lines = str(error).split("\n")  # the first line of numba's says enough
-    text = " ".join(lines[0].split()) or "no message"
-    fault = text if isinstance(error, Unusable) else f"{type(error).__name__}: {text}"
+def _failure(outcome: Outcome, who: object, t_s: float, error: BaseException) -> FlightCodeFailed:
+    """What ends the flight of `who`; raises instead where it is the command that shall end, or the time that is up."""
+    if isinstance(error, Interrupted | TimedOut):
+        raise error
+    check()  # flight code may have swallowed it, and raised something else
+    fault = printable(str(error)) if isinstance(error, Unusable) else described(error)
     return FlightCodeFailed(outcome, who, t_s, fault)
 
 
@@ -139,7 +143,7 @@ def estimate_of(estimator: AttitudeEstimator, measured: Measurements, flown: NDA
     try:
         estimate = estimator.update(measured)
         record_estimate(flown, k, estimate)
-    except Exception as error:
+    except BaseException as error:
         raise _failure(Outcome.ESTIMATOR_FAILED, estimator, measured.imu.t_s, error) from error
     return estimate
 
@@ -156,6 +160,6 @@ def command_of(
     try:
         command = autopilot.update(estimate, measured, setpoint)
         record_command(flown, k, command)
-    except Exception as error:
+    except BaseException as error:
         raise _failure(Outcome.AUTOPILOT_FAILED, autopilot, measured.imu.t_s, error) from error
     return command

@@ -104,6 +104,8 @@ class Outcome(StrEnum):
     DIVERGED = "diverged"
     ESTIMATOR_FAILED = "estimator_failed"
     AUTOPILOT_FAILED = "autopilot_failed"
+    TIMED_OUT = "timed_out"  # took longer than the wall-clock limit
+    WORKER_DIED = "worker_died"  # the process that flew it is gone; nothing of it is recorded
     INTERRUPTED = "interrupted"
 
 
@@ -123,6 +125,7 @@ class Flight:
     log : rows up to the end                 dt_s : tick length          release_s : judged times count from here
     outcome, message : how it ended, and one line where it was not as planned
     manifest : seed, resolved configuration, versions; JSON-serialisable
+    late : ticks in which the estimator took longer than the tick; of this machine and moment, so not recorded
     """
 
     log: Log
@@ -133,3 +136,4 @@ class Flight:
     message: str = ""
     events: tuple[Event, ...] = ()
     manifest: dict[str, Any] = field(default_factory=dict)
+    late: int = 0

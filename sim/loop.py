@@ -7,6 +7,7 @@ are returned.
 """
 
 from collections.abc import Callable
+from time import perf_counter_ns
 from typing import Any
 
 from autopilot.interface import NEUTRAL, Autopilot
@@ -19,6 +20,7 @@ from sim.oracle import Oracle
 from sim.plant import Plant, SimulationDiverged
 from sim.power_up import mean_sample
 from sim.sensors.suite import Suite
+from sim.signals import Interrupted, TimedOut, check, listening
 
 Watch = Callable[[Log, int], None]  # shown the log and the number of its rows that are filled
 
@@ -48,42 +50,50 @@ def fly(
     watch           called once a simulated second with the log and the number of rows filled so far
     """
     outcome, message, k = Outcome.COMPLETED, "", 0
-    second = round(1.0 / plant.dt_s)
+    second, tick_ns, late = round(1.0 / plant.dt_s), 1e9 * plant.dt_s, 0
     to_release_s = plant.dt_s - plant.release_s
     command = NEUTRAL
     try:
-        plant.reset(log)
-        suite.reset(log)
-        make_ready(estimator, autopilot, log)
-        n_calibration = round(calibration_s / plant.dt_s)
-        for k in range(len(log)):
-            ended = plant.advance(k, command)
-            if ended is not None:
-                outcome = ended
-                break
-            measured = suite.measure(k)
-            if k < n_calibration:
-                record_command(log.flown, k, command)
-                continue
-            if k == n_calibration:
-                power_up(estimator, mean_sample(log.measured[:k]) if k else on_ground)
-            setpoint = script.at(k * plant.dt_s + to_release_s)
-            estimate = estimate_of(estimator, measured, log.flown, k)
-            command = command_of(autopilot, estimate, measured, setpoint, log.flown, k)
-            if watch is not None and k % second == second - 1:
-                watch(log, k + 1)
-        else:
-            k = len(log)
+        with listening():
+            plant.reset(log)
+            suite.reset(log)
+            make_ready(estimator, autopilot, log)
+            n_calibration = round(calibration_s / plant.dt_s)
+            for k in range(len(log)):
+                ended = plant.advance(k, command)
+                if ended is not None:
+                    outcome = ended
+                    break
+                measured = suite.measure(k)
+                if k < n_calibration:
+                    record_command(log.flown, k, command)
+                    continue
+                if k == n_calibration:
+                    power_up(estimator, mean_sample(log.measured[:k]) if k else on_ground)
+                setpoint = script.at(k * plant.dt_s + to_release_s)
+                began_ns = perf_counter_ns()
+                estimate = estimate_of(estimator, measured, log.flown, k)
+                late += perf_counter_ns() - began_ns > tick_ns
+                command = command_of(autopilot, estimate, measured, setpoint, log.flown, k)
+                if k % second == second - 1:
+                    check()
+                    if watch is not None:
+                        watch(log, k + 1)
+            else:
+                k = len(log)
     except FlightCodeFailed as failure:
         outcome, message = failure.outcome, str(failure)
     except SimulationDiverged as blow_up:
         outcome, message = Outcome.DIVERGED, str(blow_up)
-    except KeyboardInterrupt:
+    except Interrupted:
         outcome, message = Outcome.INTERRUPTED, f"interrupted {k * plant.dt_s:.1f} s after power-up"
+    except TimedOut:
+        outcome = Outcome.TIMED_OUT
+        message = f"the time for this flight was up {k * plant.dt_s:.1f} s after power-up"
     flown = log.until(k)
     events = events_of(flown, outcome, message, script, plant.release_s)
     reference: HeadingReference = getattr(estimator, "heading_reference", "course")
-    return Flight(flown, plant.dt_s, plant.release_s, outcome, reference, message, events, manifest or {})
+    return Flight(flown, plant.dt_s, plant.release_s, outcome, reference, message, events, manifest or {}, late)
 
 
 def make_ready(estimator: AttitudeEstimator, autopilot: Autopilot, log: Log) -> None:

@@ -1,5 +1,7 @@
 """How the loop ends a flight: what is kept, who is blamed, and the same way for everyone's flight code."""
 
+import signal
+
 import numpy as np
 import pytest
 
@@ -120,8 +122,22 @@ def test_interrupt_in_flight_keeps_the_rows_before():
     class Stopped(Level):
         def update(self, m):
             if m.k == 30:
-                raise KeyboardInterrupt
+                signal.raise_signal(signal.SIGINT)
             return super().update(m)
 
-    flight = flown(estimator=Stopped())
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored: nohup, make test &
+    try:
+        flight = flown(estimator=Stopped())
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert (flight.outcome, len(flight.log)) == (Outcome.INTERRUPTED, 30)
+
+
+def test_keyboard_interrupt_raised_by_the_estimator_is_its_fault():
+    """Only a signal is Ctrl-C."""
+
+    class Raises(Level):
+        def update(self, m):
+            raise KeyboardInterrupt
+
+    assert flown(estimator=Raises()).outcome == Outcome.ESTIMATOR_FAILED
