@@ -16,10 +16,12 @@ from types import FrameType
 
 ECHO_S = 0.5  # a second signal within this time is the same one: a terminal and a parent both pass it on
 REPEAT_S = 1.0  # between two reminders that the time is up
+# What ends a command: Ctrl-C, a CI system that cancels, a terminal that is closed.
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Interrupted(KeyboardInterrupt):
-    """Somebody wants the command to end: Ctrl-C, or SIGTERM."""
+    """Somebody wants the command to end."""
 
 
 class TimedOut(BaseException):
@@ -38,14 +40,14 @@ _heard = _Heard()
 
 @contextmanager
 def listening() -> Iterator[None]:
-    """Raise `Interrupted` on Ctrl-C and SIGTERM inside the block.
+    """Raise `Interrupted` on Ctrl-C, SIGTERM and SIGHUP inside the block.
 
     Signals that are ignored (``nohup``), and those that somebody else handles, are left as they are.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    standard = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
+    standard = {n: signal.default_int_handler if n == signal.SIGINT else signal.SIG_DFL for n in ENDING}
     before = {number: signal.getsignal(number) for number in standard}
     ours = [number for number in standard if before[number] is standard[number]]
     for number in ours:

@@ -10,8 +10,9 @@ from typing import Any
 from scenarios.harness import console
 from scenarios.harness.claim import Claim, Finding
 from scenarios.harness.claim_registry import claims
-from scenarios.harness.gate import fly_each
 from scenarios.harness.verdict import FAILED, PASSED, SIMULATION_FAILED, plain
+from scenarios.harness.workers import fly_each
+from sim.log import Outcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +79,10 @@ class Task:
             return Found(self.name, None, problem=f"{type(error).__name__}: {why}")
         return Found(self.name, finding.undrawn(), picture)
 
+    def lost(self, outcome: Outcome, message: str) -> Found:
+        """What became of it where nothing came back."""
+        return Found(self.name, None, problem=f"{outcome.replace('_', ' ')}: {message}")
+
 
 @dataclass(frozen=True, slots=True)
 class Findings:
@@ -118,6 +123,7 @@ def measure(
     advance: Callable[[int, int], None],
     *,
     drawn: bool = False,
+    limit_s: float | None = None,
 ) -> Findings:
     """Put the claims of `wanted` to the test.
 
@@ -126,10 +132,11 @@ def measure(
     seeds       flown of each claim that leaves something to chance; None is from 0 on as many as each claim wants
     advance     is told how many claims are done, of how many
     drawn       whether their pictures are wanted
+    limit_s     longest that one may take, by the clock on the wall
     """
     numbers = {c.name: tuple(range(c.seeds) if seeds is None or not c.seeds else seeds) for c in wanted}
     # The long ones first, so that at the end no process waits for another.
     tasks = [Task(c.name, numbers[c.name], drawn) for c in sorted(wanted, key=lambda c: -c.seeds)]
-    done = fly_each(tasks, workers, advance, lambda _found: False)
+    done = fly_each(tasks, workers, advance, limit_s=limit_s)
     by_name = {found.name: found for found in done.values()}
     return Findings(tuple(by_name[c.name] for c in wanted if c.name in by_name), len(wanted))

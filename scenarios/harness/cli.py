@@ -5,7 +5,6 @@ problem of usage or configuration is one line on standard error, found before an
 imports wait until a command needs them.
 """
 
-import sys
 from functools import partial
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -13,18 +12,21 @@ from typing import Annotated
 
 import typer
 
-from scenarios.harness import console
+from scenarios.harness import console, guard
 from scenarios.harness.cli_options import (
+    FLIGHT_TIMEOUT_S,
     AircraftOption,
     AutopilotOption,
     CalibrationOption,
     ColumnsOption,
     EstimatorOption,
     FaultOption,
+    FlightTimeoutOption,
     GpsRateOption,
     GustOption,
     ImuRateOption,
     JsonOption,
+    LedgerOption,
     LogEstimatorsOption,
     MarkdownOption,
     ParameterOption,
@@ -45,9 +47,11 @@ from scenarios.harness.cli_options import (
     fitted,
     given,
     names_of,
+    time_limit,
 )
 from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
 from scenarios.harness.console import INTERRUPTED, USAGE
+from sim.signals import listening
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
 
@@ -61,15 +65,11 @@ app = typer.Typer(
 )
 
 
-def main() -> None:
-    """Entry point of the console script."""
-    sys.exit(run(sys.argv[1:]))
-
-
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     try:
-        code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
+        with listening():
+            code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
     except typer.TyperException as problem:
         console.error(problem.format_message())
         return USAGE
@@ -125,6 +125,7 @@ def fly(
     ] = None,
     set_: SetOption = None,
     withhold: WithholdOption = None,
+    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
     out: Annotated[Path, typer.Option(help="Folder for the recording.")] = FLIGHTS,
     no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Watch it in the Rerun viewer, in real time.")] = False,
@@ -140,9 +141,10 @@ def fly(
     with reporting(json_) as report:
         with usage():
             changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
-            flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web)
-        single.tell(flown)
+            limit_s = None if live else time_limit(flight_timeout)
+            flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web, limit_s=limit_s)
         report(flown.to_json())
+        single.tell(flown)  # last: a reader who closes the pipe loses no report
     if flown.shown is not None:
         viewing.stay(flown.shown.viewer)
     return flown.exit_code
@@ -167,15 +169,20 @@ def check(
     set_: SetOption = None,
     withhold: WithholdOption = None,
     workers: WorkersOption = None,
+    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
+    ledger: LedgerOption = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
     """The gate for CI: fly scenarios on many seeds, judge each flight and all of them pooled."""
     from scenarios.harness import gate
+    from scenarios.harness import workers as crew
+    from scenarios.harness.ledger import Ledger
 
     with reporting(json_) as report:
         with usage():
+            limit_s = time_limit(flight_timeout)
             for path in (junit, markdown):
                 check_file(path)
             named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
@@ -183,18 +190,17 @@ def check(
             changes |= given({"withheld": withhold})
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
-            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
+            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes, keyed=ledger is not None)
+            kept = None if ledger is None else Ledger(ledger)
             console.warn_if_cold()
+            guard.stage("while it judged", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
-                verdict, whole = gate.fly_all(tasks, workers or gate.processors(), advance)
-        if whole:
-            write(junit, verdict.to_junit)
-            write(markdown, verdict.to_markdown)
-        report(verdict.to_json() | ({} if whole else {"passed": False, "interrupted": True}))
-        gate.tell(verdict)  # last: a reader who closes the pipe loses no report
-        if not whole:
-            return INTERRUPTED
-    return verdict.exit_code
+                run = gate.fly_all(tasks, workers or crew.processors(), advance, limit_s=limit_s, ledger=kept)
+        write(junit, run.verdict.to_junit)
+        write(markdown, run.verdict.to_markdown)
+        report(run.to_json())
+        gate.tell(run.verdict)  # last: a reader who closes the pipe loses no report
+    return run.exit_code
 
 
 @app.command()
@@ -216,6 +222,7 @@ def compare(
     set_: SetOption = None,
     withhold: WithholdOption = None,
     workers: WorkersOption = None,
+    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it, as PNG, SVG or PDF.")] = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
@@ -223,9 +230,11 @@ def compare(
     """Estimators side by side: each flies the scenario on the same seeds, through the same air and noise."""
     from scenarios.harness import compare as comparing
     from scenarios.harness import gate, handbook
+    from scenarios.harness import workers as crew
 
     with reporting(json_) as report:
         with usage():
+            limit_s = time_limit(flight_timeout)
             check_file(picture)
             check_file(markdown)
             handbook.check_picture(picture)
@@ -234,8 +243,9 @@ def compare(
             changes |= given({"withheld": withhold})
             plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
             console.warn_if_cold()
+            guard.stage("while it compared", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
-                compared = comparing.fly(plan, workers or gate.processors(), advance)
+                compared = comparing.fly(plan, workers or crew.processors(), advance, limit_s=limit_s)
         if picture is not None:
             from scenarios.harness import compare_picture
 
@@ -254,6 +264,7 @@ def claims(
         str | None, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7. [default: of each claim]")
     ] = None,
     workers: WorkersOption = None,
+    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
     list_only: Annotated[bool, typer.Option("--list", help="Say what claims there are, and measure none.")] = False,
     pictures: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Draw them. [default: images beside the Markdown]")
@@ -263,10 +274,12 @@ def claims(
 ) -> int:
     """What the papers claim, put to the test: each with its numbers, its verdict and its picture."""
     from scenarios.harness import claim_report, claim_run, gate
+    from scenarios.harness import workers as crew
     from scenarios.harness.claim_registry import matching
 
     with reporting(json_) as report:
         with usage():
+            limit_s = time_limit(flight_timeout)
             wanted = matching(names or [])
             if list_only:
                 report(claim_report.listed(wanted))
@@ -278,7 +291,12 @@ def claims(
             console.warn_if_cold()
             with console.progress("measuring", "claims") as advance:
                 findings = claim_run.measure(
-                    wanted, numbers, workers or gate.processors(), advance, drawn=folder is not None
+                    wanted,
+                    numbers,
+                    workers or crew.processors(),
+                    advance,
+                    drawn=folder is not None,
+                    limit_s=limit_s,
                 )
         claim_report.write_all(findings, markdown, folder)
         report(findings.to_json())

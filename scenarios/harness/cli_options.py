@@ -65,6 +65,15 @@ JsonOption = Annotated[
 ]
 WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
 WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")]
+FlightTimeoutOption = Annotated[
+    float,
+    typer.Option("--flight-timeout", metavar="S", help="Longest a flight may take, by the clock on the wall."),
+]
+LedgerOption = Annotated[
+    Path | None,
+    typer.Option("--ledger", metavar="FOLDER", help="Keep each verdict there as it comes, and fly what is missing."),
+]
+FLIGHT_TIMEOUT_S = 600.0
 MarkdownOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")]
 CalibrationOption = Annotated[
     float | None,
@@ -97,6 +106,13 @@ WithholdOption = Annotated[
         help="Properties of the instruments that nobody is given; all for all of them.",
     ),
 ]
+
+
+def time_limit(seconds: float) -> float:
+    """What ``--flight-timeout`` says; refused where it is no time to fly in."""
+    if not 0.0 < seconds <= 1e6:
+        raise refusal(f"--flight-timeout {seconds:g} s: must be above 0 and at most 1e+06 s")
+    return seconds
 
 
 def changes_of(assignments: list[str] | None) -> dict[str, Any]:

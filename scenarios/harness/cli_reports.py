@@ -6,9 +6,11 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import typer
+
+from scenarios.harness import guard
 
 
 @contextmanager
@@ -29,14 +31,46 @@ def refusal(message: str) -> typer.TyperException:
 def reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
     """Gives what writes the JSON.  Where that goes to standard output, everything else goes to standard error."""
     if target == "-":
-        stdout = sys.stdout
-        with redirect_stdout(sys.stderr):
-            yield lambda data: print(_text(data), file=stdout)
+        with _aside() as stdout:
+            yield lambda data: _publish(_text(data) + "\n", stdout)
     else:
         path = Path(target) if target is not None else None
         with usage():
             check_file(path)
         yield lambda data: write(path, lambda: _text(data) + "\n")
+
+
+@contextmanager
+def _aside() -> Iterator[TextIO]:
+    """Standard output, for JSON alone: what else is written to it, by its descriptor too, goes to standard error."""
+    stdout = sys.stdout
+    stdout.flush()
+    try:
+        descriptor = stdout.fileno()
+    except (OSError, ValueError):
+        descriptor = -1
+    if descriptor != 1:  # a stand-in of Python's
+        with redirect_stdout(sys.stderr):
+            yield stdout
+        return
+    if guard.guarding():
+        os.dup2(2, 1)  # for good: the parent has standard output
+        with redirect_stdout(sys.stderr):
+            yield stdout
+        return
+    kept = os.dup(1)
+    with open(kept, "w", encoding="utf-8") as really, redirect_stdout(sys.stderr):
+        os.dup2(2, 1)
+        try:
+            yield really
+        finally:
+            really.flush()
+            os.dup2(kept, 1)
+
+
+def _publish(text: str, stdout: TextIO) -> None:
+    if not guard.publish(text):
+        stdout.write(text)
 
 
 def _text(data: Any) -> str:

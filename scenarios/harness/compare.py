@@ -9,10 +9,12 @@ measurements of one short flight.
 import math
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich.text import Text
 
 from estimator import ESTIMATORS
@@ -23,7 +25,6 @@ from scenarios.harness.aboard import flight_code, instruments_of
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.flight import fly_config, fly_scenario
-from scenarios.harness.gate import fly_each
 from scenarios.harness.metrics import Series, heading_error_deg, inclination_error_deg, rms
 from scenarios.harness.plugins import (
     PluginError,
@@ -37,11 +38,14 @@ from scenarios.harness.preflight import prepared, unheard_settings
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, judge
+from scenarios.harness.workers import fly_each
 from sim.log import Outcome
 
+FLIGHT_CODE_FAILED = {Outcome.ESTIMATOR_FAILED, Outcome.TIMED_OUT, Outcome.WORKER_DIED}
 LETTERS = {"gyro": "G", "accelerometer": "A", "gps": "P", "magnetometer": "M", "airspeed": "V"}
 TIMED_S, TIMED_REPEATS, TIMED_MOST_NS = 4.0, 7, 1_000_000_000
 PREFIX = "estimator_params."
+NO_SERIES = Series(np.empty(0), np.empty(0), np.empty(0, np.bool_))
 _UNKNOWN = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")  # of a class that does not say
 
 
@@ -68,6 +72,11 @@ class Task:
         scenario = find(self.scenario)
         flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator)
         return Traced(judge(scenario, flight), inclination_error_deg(flight), heading_error_deg()(flight))
+
+    def lost(self, outcome: Outcome, message: str) -> Traced:
+        """What is to be known of it where nothing came back."""
+        name = find(self.scenario).name
+        return Traced(FlightVerdict(name, self.estimator, self.seed, outcome, (), {}, message), NO_SERIES, NO_SERIES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +182,7 @@ class Comparison:
             return console.INTERRUPTED
         if Outcome.DIVERGED in outcomes:
             return 3
-        return 1 if outcomes & {Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED} else 0
+        return 1 if outcomes & {*FLIGHT_CODE_FAILED, Outcome.AUTOPILOT_FAILED} else 0
 
     def to_json(self) -> dict[str, Any]:
         """All of it as plain data: a line per estimator, and the verdict on every flight as `check` writes it."""
@@ -287,16 +296,24 @@ def _can_be_loaded(name: str) -> bool:
     return True
 
 
-def fly(plan: Plan, workers: int, advance: Callable[[int, int], None]) -> Comparison:
+def fly(plan: Plan, workers: int, advance: Callable[[int, int], None], *, limit_s: float | None = None) -> Comparison:
     """Fly what is planned; `advance` is told how many flights are done, of how many.
 
-    Ctrl-C, or a worker process that was killed, leaves flights out: the comparison is then of those finished.
+    limit_s : longest that a flight may take, by the clock on the wall
+
+    Ctrl-C leaves flights out: the comparison is then of those finished.
     """
     # Seed by seed, so that an interruption leaves each estimator about as many flights as the others.
     tasks = [Task(plan.named, seed, name, plan.changes[name]) for seed in plan.seeds for name in plan.names]
-    done = fly_each(tasks, workers, advance, lambda flown: flown.verdict.outcome == Outcome.INTERRUPTED)
-    failed = {tasks[i].estimator for i in done if done[i].verdict.outcome == Outcome.ESTIMATOR_FAILED}
-    costs = _costs(plan, failed) if len(done) == len(tasks) else {}
+    done = fly_each(
+        tasks,
+        workers,
+        advance,
+        limit_s=limit_s,
+        interrupted=lambda flown: flown.verdict.outcome == Outcome.INTERRUPTED,
+    )
+    failed = {tasks[i].estimator for i in done if done[i].verdict.outcome in FLIGHT_CODE_FAILED}
+    costs = _costs(plan, failed, limit_s) if len(done) == len(tasks) else {}
     entrants = []
     for name in plan.names:
         flights = tuple(done[i] for i in sorted(done) if tasks[i].estimator == name)
@@ -317,14 +334,38 @@ def given(estimator: object, config: FlightConfig) -> tuple[str, ...]:
     return tuple(name for name in getattr(estimator, "uses", _UNKNOWN) if name in fitted)
 
 
-def _costs(plan: Plan, failed: Container[str]) -> dict[str, Cost]:
+@dataclass(frozen=True, slots=True)
+class _Timing:
+    """What an update of one estimator costs, to be measured in a process of its own: it is anyone's code."""
+
+    scenario: str
+    config: str  # as JSON
+    estimator: str
+
+    def fly(self) -> Cost | None:
+        """Measure it."""
+        config = FlightConfig.model_validate_json(self.config)
+        return cost(self.estimator, _measured(self.scenario, self.config), instruments_of(config))
+
+    def lost(self, _outcome: Outcome, _message: str) -> Cost | None:
+        """Its flights tell what is wrong with it."""
+        return None
+
+
+@lru_cache(maxsize=1)
+def _measured(scenario: str, config: str) -> NDArray[Any]:
+    """Measurements of a flight."""
+    return fly_config(find(scenario), FlightConfig.model_validate_json(config)).log.measured
+
+
+def _costs(plan: Plan, failed: Container[str], limit_s: float | None) -> dict[str, Cost]:
     """What an update of each that did not fail costs, over the measurements of the first seconds of a flight."""
     another = {"duration_s": TIMED_S, "estimator": "premerlani", "estimator_params": {}}
-    config = plan.config.model_copy(update=another)
-    rows = fly_config(plan.scenario, config).log.measured
+    config = plan.config.model_copy(update=another).model_dump_json()
     # The oracle answers in a flight alone.
-    timed = (name for name in plan.names if name not in failed and name != "oracle")
-    return {name: cost(name, rows, instruments_of(config)) for name in timed}
+    timed = [name for name in plan.names if name not in failed and name != "oracle"]
+    found = fly_each([_Timing(plan.named, config, name) for name in timed], 1, lambda _n, _total: None, limit_s=limit_s)
+    return {timed[i]: measured for i, measured in found.items() if measured is not None}
 
 
 def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
@@ -388,7 +429,8 @@ def tell(comparison: Comparison) -> None:
         for flown in entrant.flights:
             v = flown.verdict
             if v.outcome != Outcome.COMPLETED:
-                why = f"{v.outcome.replace('_', ' ')} at {v.metrics['flown_s'] or 0.0:.1f} s"
+                at = f" at {v.metrics['flown_s'] or 0.0:.1f} s" if v.metrics else ""
+                why = f"{v.outcome.replace('_', ' ')}{at}"
                 text = f"{entrant.name}, seed {v.seed}: {why}" + (f": {v.message}" if v.message else "")
                 out.print(Text(text, "red"), soft_wrap=True)
 

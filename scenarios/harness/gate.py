@@ -4,41 +4,26 @@ A flight is decided by its scenario, its overrides and its seed alone, and the v
 in which the flights were named, so neither the number of workers nor their speed shows in the result.
 """
 
-import multiprocessing
-import os
 import re
-import signal
-import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any
 
 from rich.text import Text
 
 from scenarios.harness import console
 from scenarios.harness.flight import fly_scenario
+from scenarios.harness.ledger import Ledger
 from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find, matching
+from scenarios.harness.sources import decided_by, fingerprint
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
+from scenarios.harness.workers import fly_each
+from sim import recording
 from sim.log import Outcome
 
 LARGEST_SEED = 2**32 - 1
-_Result = TypeVar("_Result")
-_Told = TypeVar("_Told", covariant=True)
-
-
-class WorkerDied(RuntimeError):
-    """A worker process was killed from outside, so that flights are missing."""
-
-
-class Flyable(Protocol[_Told]):
-    """A flight that can be sent to a process."""
-
-    def fly(self) -> _Told:
-        """Fly it, and say what is to be known of it."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,19 +32,35 @@ class Task:
 
     scenario: str
     seed: int
-    estimator: str | None
+    estimator: str
     overrides: Mapping[str, Any]
+    name: str  # of the scenario, which may be named by its file
+    key: str = ""  # fingerprint of all that decides it, where there is a ledger
 
     def fly(self) -> FlightVerdict:
         """Fly it and judge it."""
-        scenario = find(self.scenario)
-        return judge(scenario, fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator))
+        began_s, scenario = time.monotonic(), find(self.scenario)
+        judged = judge(scenario, fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator))
+        return replace(judged, wall_s=time.monotonic() - began_s)
+
+    def lost(self, outcome: Outcome, message: str) -> FlightVerdict:
+        """The verdict where nothing came back."""
+        return FlightVerdict(self.name, self.estimator, self.seed, outcome, (), {}, message)
 
 
-def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, changes: Mapping[str, Any]) -> list[Task]:
+def tasks(
+    names: Sequence[str],
+    seeds: Sequence[int],
+    estimator: str | None,
+    changes: Mapping[str, Any],
+    *,
+    keyed: bool = False,
+) -> list[Task]:
     """Every scenario of `names` (all there are, where it is empty) on every seed.
 
     With an estimator of one's own, those that pass where their own estimator fails are left out, unless named in full.
+
+    keyed : with the fingerprint of what decides each, for a ledger
 
     Raises
     ------
@@ -71,11 +72,16 @@ def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, cha
         wanted = [name for name in wanted if name not in left_out]
         if not wanted:
             raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
+    found = []
     for name in wanted:
-        _, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
+        scenario, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
         console.warn_of_faults(name, config)
+        decides = decided_by(name, config) | {"changes": recording.plain(changes)} if keyed else {}
+        for seed in seeds:
+            key = fingerprint(decides | {"seed": seed}) if keyed else ""
+            found.append(Task(name, seed, config.estimator, changes, scenario.name, key))
     console.note_left_out(left_out)
-    return [Task(name, seed, estimator, changes) for name in wanted for seed in seeds]
+    return found
 
 
 def tell(verdict: Verdict) -> None:
@@ -118,75 +124,63 @@ def parse_seeds(text: str) -> list[int]:
     return list(seeds)
 
 
-def fly_all(tasks: Sequence[Task], workers: int, advance: Callable[[int, int], None]) -> tuple[Verdict, bool]:
-    """Fly and judge all `tasks`; `advance` is told how many are done, of how many.
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What became of all flights that were asked for.
 
-    Returns
-    -------
-    the verdict on the flights that were finished, and whether these are all: Ctrl-C leaves some out, and so does a
-    worker process that was killed (one line says so)
-
-    Raises
-    ------
-    ValueError      as `fly_scenario` does
+    flown, resumed : flights that were flown now, and that the ledger held      missing : that were not finished
     """
-    done = fly_each(tasks, workers, advance, lambda verdict: verdict.outcome == Outcome.INTERRUPTED)
-    return Verdict.of((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(done) == len(tasks)
+
+    verdict: Verdict
+    flown: int
+    resumed: int
+    missing: int
+    wall_s: float
+
+    @property
+    def exit_code(self) -> int:
+        """As of the command line."""
+        return console.INTERRUPTED if self.missing else self.verdict.exit_code
+
+    def to_json(self) -> dict[str, Any]:
+        """The verdict, and under ``run`` all that another run of the same command may tell otherwise."""
+        flights = [{"scenario": v.scenario, "seed": v.seed, "wall_s": v.wall_s} for v in self.verdict.flights]
+        run = {"flown": self.flown, "resumed": self.resumed, "wall_s": self.wall_s, "flights": flights}
+        return self.verdict.to_json() | {"run": run}
 
 
-def fly_each(
-    tasks: Sequence[Flyable[_Result]],
+def fly_all(
+    tasks: Sequence[Task],
     workers: int,
     advance: Callable[[int, int], None],
-    interrupted: Callable[[_Result], bool],
-) -> dict[int, _Result]:
-    """Fly all `tasks`: the results that were finished, by the number of the task; those missing as in `fly_all`."""
-    done: dict[int, _Result] = {}
+    *,
+    limit_s: float | None = None,
+    ledger: Ledger | None = None,
+) -> Run:
+    """Fly and judge all `tasks`, but for those whose verdict `ledger` holds, and keep there what is flown.
 
-    def keep(i: int, result: _Result) -> None:
-        if interrupted(result):
-            raise KeyboardInterrupt
-        done[i] = result
-        advance(len(done), len(tasks))
+    limit_s : longest a flight may take, by the clock on the wall       advance : is told how many are done, of how many
 
-    try:
-        if workers == 1:
-            for i, task in enumerate(tasks):
-                keep(i, task.fly())
-        else:
-            _fly_over_processes(tasks, workers, keep)
-    except KeyboardInterrupt:
-        pass  # what has been finished is judged; the caller sees that flights are missing
-    except WorkerDied as problem:
-        console.error(str(problem))
-    return done
+    The verdict is on the flights that were finished: Ctrl-C leaves some out.
+    """
+    began_s = time.monotonic()
+    kept = {i: ledger.find(task.key, task.name, task.seed) for i, task in enumerate(tasks)} if ledger else {}
+    done = {i: verdict for i, verdict in kept.items() if verdict is not None}
+    missing = [i for i in range(len(tasks)) if i not in done]
 
+    def keep(k: int, verdict: FlightVerdict) -> None:
+        if ledger is not None:
+            ledger.keep(tasks[missing[k]].key, verdict)
 
-def _fly_over_processes(tasks: Sequence[Flyable[_Result]], workers: int, keep: Callable[[int, _Result], None]) -> None:
-    # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
-    context = multiprocessing.get_context("spawn")
-    workers = min(workers, len(tasks))
-    with ProcessPoolExecutor(workers, mp_context=context, initializer=_set_up_worker) as pool:
-        waiting: dict[Future[_Result], int] = {pool.submit(task.fly): i for i, task in enumerate(tasks)}
-        try:
-            while waiting:
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                    keep(waiting.pop(future), future.result())
-        except KeyboardInterrupt:
-            for worker in multiprocessing.active_children():  # what they are at is thrown away: it may take long
-                worker.terminate()
-            raise
-        except BrokenProcessPool as error:
-            raise WorkerDied(f"a worker process died with {len(waiting)} flights to go; try fewer --workers") from error
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-def processors() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _set_up_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
-    sys.stdout = sys.stderr  # standard output may be carrying JSON
+    flown = fly_each(
+        [tasks[i] for i in missing],
+        workers,
+        lambda n, _total: advance(len(tasks) - len(missing) + n, len(tasks)),
+        limit_s=limit_s,
+        interrupted=lambda verdict: verdict.outcome == Outcome.INTERRUPTED,
+        keep=keep,
+    )
+    resumed = len(done)
+    done |= {missing[k]: verdict for k, verdict in flown.items()}
+    verdict = Verdict.of(((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(tasks) - len(done))
+    return Run(verdict, len(flown), resumed, len(tasks) - len(done), time.monotonic() - began_s)

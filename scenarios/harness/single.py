@@ -8,7 +8,7 @@ from typing import Any
 from rich.text import Text
 
 from estimator.instruments import to_json
-from scenarios.harness import console, viewing
+from scenarios.harness import console, guard, viewing
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config
 from scenarios.harness.preflight import prepared
@@ -16,22 +16,29 @@ from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Flight, Log, Outcome
+from sim.signals import limited
+
+_FLIGHT = "the flight"
+LATE_SHARE = 0.05  # of the updates; a few are late on any machine that has other things to do
 
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """A flight that was flown, recorded and judged; `shown` live, or not."""
+    """A flight that was flown, recorded and judged; `shown` live, or not.
+
+    flight, folder : None where the process that flew it is gone, and nothing of it is left
+    """
 
     scenario: Scenario
-    flight: Flight
+    flight: Flight | None
     judged: FlightVerdict
-    folder: Path
+    folder: Path | None
     shown: viewing.RealTime | None = None
 
     @property
     def exit_code(self) -> int:
         """As of the command line."""
-        if self.flight.outcome == Outcome.INTERRUPTED:
+        if self.judged.outcome == Outcome.INTERRUPTED:
             return console.INTERRUPTED
         return self._verdict.exit_code
 
@@ -41,14 +48,26 @@ class Flown:
 
     def to_json(self) -> dict[str, Any]:
         """The verdict, what the estimator was given of the instruments, and where the recording lies."""
-        return self._verdict.to_json() | {"known": to_json(self.judged.known), "recording": str(self.folder)}
+        return self._verdict.to_json() | {
+            "known": to_json(self.judged.known),
+            "recording": None if self.folder is None else str(self.folder),
+        }
 
 
-def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bool, live: bool, web: bool) -> Flown:
+def fly(
+    scenario_name: str,
+    changes: Mapping[str, Any],
+    into: Path,
+    *,
+    rerun: bool,
+    live: bool,
+    web: bool,
+    limit_s: float | None = None,
+) -> Flown:
     """Fly, record below the folder `into`, judge.
 
     rerun : write a Rerun recording too             live : show it in the viewer while it is flown, in real time
-    web : the viewer in a browser
+    web : the viewer in a browser                   limit_s : longest it may take, by the clock on the wall
 
     Raises
     ------
@@ -57,6 +76,11 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
     scenario, config = prepared(scenario_name, changes)
     recording.check_writable(into)
     console.warn_of_faults(scenario.name, config)
+    if _FLIGHT in guard.lost:
+        timed_out, message = guard.lost[_FLIGHT]
+        outcome = Outcome.TIMED_OUT if timed_out else Outcome.WORKER_DIED
+        gone = FlightVerdict(scenario.name, config.estimator, config.seed, outcome, (), {}, f"the process {message}")
+        return Flown(scenario, None, gone, None)
     console.warn_if_cold()
     live_view = viewing.live(scenario.name, config, web=web) if live else None
     with console.progress(f"flying {scenario.name}", "s") as advance:
@@ -66,7 +90,9 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
             if live_view is not None:
                 live_view(log, n_rows)
 
-        flight = fly_config(scenario, config, watch=watch)
+        with guard.watched(_FLIGHT, None if limit_s is None else limit_s + guard.GRACE_S), limited(limit_s):
+            flight = fly_config(scenario, config, watch=watch)
+    _warn_if_late(flight)
     judged = judge(scenario, flight)
     flight = replace(flight, manifest={**flight.manifest, "verdict": recording.plain(judged.rows)})  # for its story
     if live_view is not None:
@@ -77,9 +103,30 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
     return Flown(scenario, flight, judged, folder, live_view)
 
 
+def _warn_if_late(flight: Flight) -> None:
+    """Say that the estimator is too slow for its tick, where it often was."""
+    ticks = len(flight.log)
+    if flight.late > LATE_SHARE * ticks:
+        console.error(
+            f"warning: {flight.late} of {ticks} updates of the estimator took longer than the tick of "
+            f"{1000.0 * flight.dt_s:g} ms: aboard it would fall behind"
+        )
+
+
+def _ended(judged: FlightVerdict) -> str:
+    words = judged.outcome.replace("_", " ")
+    return f"{words}: {judged.message}" if judged.message else words
+
+
 def tell(flown: Flown) -> None:
     """The verdict, how the flight ended, and where to see it."""
     out, flight, judged = console.out(), flown.flight, flown.judged
+    if flight is None:
+        out.print(
+            Text(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}: {_ended(judged)}", "bold red"),
+            soft_wrap=True,
+        )
+        return
     out.print(console.verdict_table(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}", judged.rows))
     ended = (
         f"{flight.outcome.replace('_', ' ')} {len(flight.log) * flight.dt_s - flight.release_s:.1f} s after the release"

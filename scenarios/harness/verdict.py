@@ -21,6 +21,7 @@ class FlightVerdict:
     """One flight judged: which it was, how it ended, its lines, and the numbers reported beside them.
 
     known : what the estimator was given of the instruments, or has learnt, by name
+    wall_s : time that it took to fly and judge; of the machine and the moment, so no part of what is compared
     """
 
     scenario: str
@@ -32,6 +33,7 @@ class FlightVerdict:
     message: str = ""
     flight: int = 0
     known: Mapping[str, Known] = field(default_factory=dict)
+    wall_s: float | None = field(default=None, compare=False)
 
     @property
     def passed(self) -> bool:
@@ -71,21 +73,31 @@ class Verdict:
 
     flights: tuple[FlightVerdict, ...]
     pooled: tuple[PooledVerdict, ...]
+    missing: int = 0  # flights that were asked for and not finished
 
     @classmethod
-    def of(cls, judged: Iterable[tuple[Scenario, FlightVerdict]]) -> "Verdict":
+    def of(cls, judged: Iterable[tuple[Scenario, FlightVerdict]], missing: int = 0) -> "Verdict":
         """Verdict from the flights of one or several scenarios and estimators, pooled over each pair of them."""
         flights, groups = [], {}  # type: ignore[var-annotated]
         for scenario, flight in judged:
             flights.append(flight)
             groups.setdefault((scenario.name, flight.estimator), (scenario, []))[1].append(flight)
         pooled = [_pool(scenario, estimator, of_it) for (_, estimator), (scenario, of_it) in groups.items()]
-        return cls(tuple(flights), tuple(pooled))
+        return cls(tuple(flights), tuple(pooled), missing)
 
     @property
     def passed(self) -> bool:
-        """Whether every flight and every pooled check passed; False where nothing was flown."""
-        return bool(self.flights) and all(v.passed for v in self.flights) and all(v.passed for v in self.pooled)
+        """Whether every flight and every pooled check passed; False where nothing was flown, or flights are missing."""
+        return (
+            bool(self.flights)
+            and not self.missing
+            and all(v.passed for v in self.flights)
+            and all(v.passed for v in self.pooled)
+        )
+
+    @property
+    def _missing_text(self) -> str:
+        return f"{self.missing} of {len(self.flights) + self.missing} flights are missing"
 
     @property
     def exit_code(self) -> int:
@@ -114,7 +126,7 @@ class Verdict:
                 }
                 for v in self.pooled
             ],
-        }  # fmt: skip
+        } | ({"interrupted": True} if self.missing else {})  # fmt: skip
 
     def to_json_text(self) -> str:
         """The verdict as JSON text."""
@@ -140,12 +152,18 @@ class Verdict:
                         part for part in (f"{measured_text(row)}, limit {limit_text(row)}", message) if part
                     )
                     ElementTree.SubElement(case, "failure", message=_printable(text))
+        if self.missing:
+            suite = ElementTree.SubElement(root, "testsuite", name="incomplete", tests="1", failures="0", errors="1")
+            case = ElementTree.SubElement(suite, "testcase", classname="incomplete", name="all flights are finished")
+            ElementTree.SubElement(case, "error", message=self._missing_text)
         ElementTree.indent(root)
         return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
     def to_markdown(self) -> str:
         """The verdict as Markdown: the pooled table of each scenario, then the flights that failed."""
         lines = [f"# Verdict: {'passed' if self.passed else 'FAILED'}", ""]
+        if self.missing:
+            lines = ["# Verdict: INCOMPLETE", "", f"Interrupted: {self._missing_text}.", ""]
         for pool in self.pooled:
             of_it = [v for v in self.flights if (v.scenario, v.estimator) == (pool.scenario, pool.estimator)]
             lines += [f"## {pool.scenario}, {pool.estimator}, {_counted(pool.n_flights)}", "", *_table(pool.rows), ""]
@@ -156,7 +174,7 @@ class Verdict:
 
 
 def _pool(scenario: Scenario, estimator: str, flights: Sequence[FlightVerdict]) -> PooledVerdict:
-    rows = (check.pool([v.rows[i] for v in flights]) for i, check in enumerate(scenario.checks))
+    rows = (check.pool([v.rows[i] for v in flights if v.rows]) for i, check in enumerate(scenario.checks))
     return PooledVerdict(scenario.name, estimator, len(flights), tuple(rows))
 
 

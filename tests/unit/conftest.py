@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.interface import MEASURED_DTYPE
-from scenarios.harness import logs
+from scenarios.harness import logs, workers
 from scenarios.harness.logs.recorded import RecordedLog, Reference
 
 PLACE = 47.4, 8.5, 488.0
@@ -67,6 +67,17 @@ class LoggedFlight:
         """The same as a log, with the true attitude."""
         instruments = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
         return RecordedLog(self.expected(), "expected", instruments, Reference(self.R_eb, "truth", "the curve"))
+
+
+@pytest.fixture
+def in_process(monkeypatch) -> None:
+    """Flights of `check`, `compare` and `claims` in this process, where a test can reach into them."""
+
+    def results(tasks, _workers, limit_s):
+        for i, task in enumerate(tasks):
+            yield i, workers._fly(task, limit_s)
+
+    monkeypatch.setattr(workers, "_results", results)
 
 
 @pytest.fixture(scope="session")

@@ -39,7 +39,7 @@ def claim(name="so", measure=lambda seeds: finding(), expected=Verdict.CONFIRMED
 
 
 @pytest.fixture
-def only(monkeypatch, tmp_path):
+def only(monkeypatch, in_process, tmp_path):
     """Have these claims alone, in an empty working directory, in this process."""
     monkeypatch.chdir(tmp_path)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from estimator import ESTIMATORS
-from scenarios.harness import compare, compare_picture, gate
+from scenarios.harness import compare, compare_picture
 from scenarios.harness.checks import Row
 from scenarios.harness.cli import run
 from scenarios.harness.flight import fly_scenario
@@ -137,7 +137,7 @@ def test_compare_estimator_that_fails_is_exit_code_1_and_the_others_fly(here: Pa
     assert "ZeroDivisionError" in capsys.readouterr().out
 
 
-def test_compare_interrupted_keeps_what_was_finished(here: Path, monkeypatch, capsys) -> None:
+def test_compare_interrupted_keeps_what_was_finished(here: Path, monkeypatch, in_process, capsys) -> None:
     """Ctrl-C in the fourth of six flights: three are told, each estimator has at least one, exit code 130."""
     really, flown = compare.fly_scenario, []
 
@@ -156,19 +156,15 @@ def test_compare_interrupted_keeps_what_was_finished(here: Path, monkeypatch, ca
     assert "gyro_only" in capsys.readouterr().out
 
 
-def test_compare_worker_that_dies_loses_nothing_that_was_finished(monkeypatch, capsys) -> None:
-    """As of the gate: one line, and the comparison of the flights that are there."""
-
-    def one_then_dead(tasks, workers, keep):
-        keep(0, tasks[0].fly())
-        raise gate.WorkerDied("a worker process died with 1 flights to go; try fewer --workers")
-
-    monkeypatch.setattr(gate, "_fly_over_processes", one_then_dead)
-    plan = compare.prepare("crosswind", ["gyro_only"], [0, 1], {"duration_s": 3.0})
-    compared = compare.fly(plan, 2, lambda _done, _total: None)
-    assert [f.verdict.seed for f in compared.entrants[0].flights] == [0]
-    assert compared.exit_code == 130
-    assert "worker process died" in capsys.readouterr().err
+def test_compare_worker_that_dies_costs_its_own_flights_alone(here: Path, capsys) -> None:
+    """The estimator that ends its process fails; the other is compared."""
+    Path("own.py").write_text(
+        "import os\nclass Leaves:\n    def update(self, m):\n        os._exit(0)\n", encoding="utf-8"
+    )
+    assert run([*QUICK, "--estimators", "own.py:Leaves,gyro_only", "--seeds", "0", "--json", "c.json"]) == 1
+    left, flew = json.loads((here / "c.json").read_text())["estimators"]
+    assert (left["survived"], flew["survived"]) == (0, 1)
+    assert "worker died: the process that flew it ended by itself (exit code 0)" in capsys.readouterr().out
 
 
 def test_compare_without_names_flies_all_whose_package_is_there(monkeypatch, capsys) -> None:

@@ -1,0 +1,35 @@
+"""Child processes that do not outlive the process that started them."""
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+import time
+
+_PR_SET_PDEATHSIG = 1  # prctl(2)
+_LOOK_S = 0.5
+
+
+def die_with_parent() -> bool:
+    """Have the system kill this process when its parent ends, however it ends (prctl(2)); False where it cannot.
+
+    Survives exec, so that it can be the ``preexec_fn`` of a program that is started.
+    """
+    if sys.platform != "linux":
+        return False
+    return ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0) == 0
+
+
+def end_with_parent() -> None:
+    """`die_with_parent`, and where the system does not do that a thread that looks for the parent twice a second."""
+    if die_with_parent():
+        return
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(_LOOK_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="end with parent", daemon=True).start()

@@ -1,0 +1,173 @@
+"""The process around a command: what flight code does to its own process never passes for a verdict."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMAND = [sys.executable, "-c", "from scenarios.harness.guard import main; main()"]
+OWN = """
+import os, signal, sys, threading, time
+import numpy as np
+from estimator.interface import AttitudeEstimate
+
+LEVEL = AttitudeEstimate(np.eye(3))
+
+
+class Leaves:
+    def update(self, m):
+        if m.imu.t_s > 1.0:
+            os._exit(0)
+        return LEVEL
+
+
+class Killed:
+    def update(self, m):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Deaf:
+    def update(self, m):
+        signal.signal(signal.SIGALRM, signal.SIG_IGN)
+        while True:
+            pass
+
+
+class Writes:
+    def update(self, m):
+        for descriptor in range(1, 20):
+            try:
+                os.write(descriptor, b'{"passed": true}')
+            except OSError:
+                pass
+        return LEVEL
+
+
+class Stays:
+    def __init__(self):
+        threading.Thread(target=time.sleep, args=(1e6,)).start()
+
+    def update(self, m):
+        return LEVEL
+
+
+class Unborn:
+    def __init__(self):
+        os._exit(0)
+
+    def update(self, m):
+        return LEVEL
+
+
+class Closes:
+    def update(self, m):
+        os.closerange(1, 50)
+        return LEVEL
+
+
+class Slow:
+    def update(self, m):
+        time.sleep(0.05)
+        return LEVEL
+"""
+QUICK = ("--set", "duration_s=2", "--no-rerun", "--json", "-")
+
+
+@pytest.fixture
+def here(tmp_path: Path) -> Path:
+    """A folder with estimators that are not to be trusted."""
+    (tmp_path / "own.py").write_text(OWN, encoding="utf-8")
+    return tmp_path
+
+
+def environment() -> dict[str, str]:
+    """Of a command."""
+    return {**os.environ, "PYTHONPATH": str(ROOT)}
+
+
+def wingslevel(here: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A command, run to its end."""
+    return subprocess.run(
+        [*COMMAND, *arguments], cwd=here, env=environment(), text=True, capture_output=True, timeout=120
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "outcome", "says"),
+    [
+        ("Leaves", (), "worker_died", "the process ended by itself (exit code 0)"),
+        ("Killed", (), "worker_died", "the process was killed by signal 9 (Killed)"),
+        ("Deaf", ("--flight-timeout", "2"), "timed_out", "the process did not answer when the time was up"),
+    ],
+)
+def test_fly_estimator_that_ends_its_process_is_reported_with_exit_code_1(
+    here: Path, name: str, options: tuple[str, ...], outcome: str, says: str
+) -> None:
+    """Nothing came back of the flight; the verdict is complete all the same."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", f"own.py:{name}", *QUICK, *options)
+    verdict = json.loads(done.stdout)
+    (flight,) = verdict["flights"]
+    assert (done.returncode, verdict["passed"], flight["outcome"], flight["message"]) == (1, False, outcome, says)
+    assert verdict["recording"] is None
+    assert "Traceback" not in done.stderr
+
+
+def test_fly_estimator_that_ends_its_process_before_flying_is_exit_code_2(here: Path) -> None:
+    """Nothing was flown: the estimator cannot be constructed."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Unborn", *QUICK)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "ended by itself (exit code 0)" in done.stderr
+
+
+def test_fly_estimator_that_writes_to_every_descriptor_leaves_the_json_whole(here: Path) -> None:
+    """Standard output is the parent's alone."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Writes", *QUICK)
+    assert json.loads(done.stdout)["flights"][0]["estimator"] == "own.py:Writes"
+    assert done.returncode == 1
+
+
+def test_fly_estimator_that_closes_every_descriptor_is_no_pass(here: Path) -> None:
+    """The parent hears nothing any more, and so passes nothing."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Closes", *QUICK)
+    assert done.returncode != 0
+
+
+def test_fly_estimator_whose_thread_never_ends_does_not_keep_the_command(here: Path) -> None:
+    """The command ends when it is done, not when flight code lets it."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Stays", *QUICK)
+    assert json.loads(done.stdout)["flights"][0]["outcome"] in ("completed", "ground_contact")
+
+
+def test_fly_estimator_slower_than_the_tick_is_warned_of(here: Path) -> None:
+    """It would fall behind aboard an aeroplane."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Slow", *QUICK)
+    assert "updates of the estimator took longer than the tick of 20 ms" in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_check_that_is_cancelled_reports_what_was_finished(here: Path, number: int) -> None:
+    """Ctrl-C, and SIGTERM as CI systems send it: every report is written, marked as incomplete, exit code 130."""
+    files = ["--json", "v.json", "--junit", "v.xml", "--markdown", "v.md", "--ledger", "kept"]
+    arguments = ["check", "crosswind", "--seeds", "0-499", "--set", "duration_s=2", "--workers", "1", *files]
+    process = subprocess.Popen(
+        [*COMMAND, *arguments], cwd=here, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    while not list(here.glob("kept/*.json")) and process.poll() is None:
+        time.sleep(0.05)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    verdict = json.loads((here / "v.json").read_text())
+    assert process.returncode == 130
+    assert "interrupted" in said
+    assert (verdict["passed"], verdict["interrupted"]) == (False, True)
+    assert 0 < len(verdict["flights"]) < 500
+    missing = f"{500 - len(verdict['flights'])} of 500 flights are missing"
+    assert missing in (here / "v.md").read_text()
+    assert missing in (here / "v.xml").read_text()
