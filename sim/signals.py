@@ -4,6 +4,9 @@ Flight code may raise anything, KeyboardInterrupt too: that is its fault, and a 
 presses Ctrl-C, a CI system that cancels (SIGTERM) and a flight that takes too long must still get through.  So the
 handlers installed here raise exceptions of their own, and remember that they did, should flight code swallow them.
 
+While a kernel is compiled, the handlers raise nothing: the compiler calls back from C, where an exception is printed
+and lost.  What they have heard is raised at the compiler's next step.
+
 Python lets only the main thread have signal handlers; elsewhere the blocks below change nothing.
 """
 
@@ -13,6 +16,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+from estimator import compiling
 
 ECHO_S = 0.5  # a second signal within this time is the same one: a terminal and a parent both pass it on
 REPEAT_S = 1.0  # between two reminders that the time is up
@@ -31,6 +36,7 @@ class _Heard:
 
     at_s: float | None = None  # of the last signal that ends the command
     time_up = False
+    held: type[BaseException] | None = None  # what is to be raised at the compiler's next step
 
 
 _heard = _Heard()
@@ -88,9 +94,26 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
     if _heard.at_s is not None and now_s - _heard.at_s < ECHO_S:
         return
     _heard.at_s = now_s
-    raise Interrupted
+    _raise(Interrupted)
 
 
 def _time_up(_number: int, _frame: FrameType | None) -> None:
     _heard.time_up = True
-    raise TimedOut
+    _raise(TimedOut)
+
+
+def _raise(what: type[BaseException]) -> None:
+    if compiling.busy():
+        _heard.held = what
+    else:
+        raise what
+
+
+def _raise_held() -> None:
+    """What `_raise` held back, once; in the main thread, where it was heard."""
+    if _heard.held is not None and threading.current_thread() is threading.main_thread():
+        what, _heard.held = _heard.held, None
+        raise what
+
+
+compiling.on_pause(_raise_held)

@@ -48,6 +48,7 @@ from scenarios.harness.cli_options import (
 )
 from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
 from scenarios.harness.console import INTERRUPTED, USAGE
+from sim.signals import listening
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
 
@@ -69,7 +70,8 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     try:
-        code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
+        with listening(), console.compiling_told():
+            code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
     except typer.TyperException as problem:
         console.error(problem.format_message())
         return USAGE
@@ -184,7 +186,6 @@ def check(
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes)
-            console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
                 verdict, whole = gate.fly_all(tasks, workers or gate.processors(), advance)
         if whole:
@@ -233,7 +234,6 @@ def compare(
             changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
             changes |= given({"withheld": withhold})
             plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
-            console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
                 compared = comparing.fly(plan, workers or gate.processors(), advance)
         if picture is not None:
@@ -275,7 +275,6 @@ def claims(
             check_file(markdown)
             folder = claim_report.folder_of_pictures(markdown, pictures)
             numbers = None if seeds is None else gate.parse_seeds(seeds)
-            console.warn_if_cold()
             with console.progress("measuring", "claims") as advance:
                 findings = claim_run.measure(
                     wanted, numbers, workers or gate.processors(), advance, drawn=folder is not None
@@ -339,7 +338,6 @@ def bench(
     with reporting(json_) as report:
         from scenarios.harness import bench as benchmark
 
-        console.warn_if_cold()
         with usage(), console.progress("measuring", "pairs") as advance:
             speed = benchmark.measure(estimator, seconds, repeats, advance)
         benchmark.tell(speed)
@@ -395,7 +393,6 @@ def sensors(
             sensor_page.check_picture(picture)
             subject = sensor_names.subject(part)
             sensor_page.check_rates(subject, part)
-        console.warn_if_cold()
         with console.progress("lying still", "axis-hours") as advance:
             page = sensor_page.make(subject, advance)
         if picture is not None:

@@ -57,7 +57,6 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
     scenario, config = prepared(scenario_name, changes)
     recording.check_writable(into)
     console.warn_of_faults(scenario.name, config)
-    console.warn_if_cold()
     live_view = viewing.live(scenario.name, config, web=web) if live else None
     with console.progress(f"flying {scenario.name}", "s") as advance:
 
