@@ -1,55 +1,17 @@
-"""The decorator of every compiled kernel, with a disk cache that notices an edited callee.
+"""The decorator of every compiled kernel.
 
-numba keys its cache by the file of the function alone: a kernel whose *callee* in another file was edited
-would be loaded stale.  The cache therefore lives in a directory named by a hash over all kernel sources of
-the project, so that any edit compiles anew and nothing else does.
+numba keys its cache by the file of the function alone: a kernel whose *callee* in another file was edited would be
+loaded stale.  Ours is keyed by all sources that a kernel's module imports, see `kernel_cache`.
 """
 
-import hashlib
-import os
-import shutil
 from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numba
-from numba import config
+from numba.core import event
 
-_ROOT = Path(__file__).resolve().parent.parent
-_PACKAGES = ("estimator", "autopilot", "sim")  # where kernels live
-_KEPT = 4  # cache directories of other versions of the sources that are left alone
-
-
-def sources_hash(root: Path = _ROOT) -> str:
-    """Hash of every Python source of the packages that hold kernels, below `root`, 16 hexadecimal digits."""
-    digest = hashlib.sha256()
-    for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*.py")):
-            digest.update(str(path.relative_to(root)).encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-@cache
-def cache_dir() -> Path:
-    """Directory of the compiled kernels of exactly these sources; made on first use, old ones pruned."""
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "wingslevel" / "kernels"
-    here = base / sources_hash()
-    try:
-        here.mkdir(parents=True, exist_ok=True)
-        os.utime(here)
-        others = sorted(base.iterdir(), key=lambda p: p.stat().st_mtime, reverse=True)
-        for stale in others[_KEPT + 1 :]:
-            shutil.rmtree(stale, ignore_errors=True)
-    except OSError:
-        pass  # no writable cache: numba falls back by itself, and compiles in memory at worst
-    return here
-
-
-def is_cold() -> bool:
-    """True where no kernel of these sources has been compiled yet: the first flight will take seconds."""
-    return not any(cache_dir().rglob("*.nbi"))
+from estimator import compiling
+from estimator.kernel_cache import KernelCache, cache_of
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -70,11 +32,43 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def _compile(function: Callable[..., Any], **options: Any) -> Any:
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_dir())
-    try:
-        return numba.njit(cache=True, error_model="numpy", **options)(function)
-    except RuntimeError:  # no place to cache in (a function typed at a prompt, a read-only home)
-        return numba.njit(error_model="numpy", **options)(function)
-    finally:
-        config.CACHE_DIR = before
+    compiled = numba.njit(error_model="numpy", **options)(function)
+    cache = cache_of(function)
+    if cache is not None:  # a function typed at a prompt has no source that could be watched
+        compiled._cache = cache
+    return compiled
+
+
+class _Compiles(event.Listener):  # type: ignore[misc]
+    """Hears when the compiler begins and ends; it does not begin where a kernel is loaded from the cache."""
+
+    def on_start(self, event: Any) -> None:
+        compiling.enter()
+        if name := _name(event):
+            compiling.begins(name)
+
+    def on_end(self, event: Any) -> None:
+        if name := _name(event):
+            compiling.ends(name)
+        compiling.leave()
+
+
+class _Passes(event.Listener):  # type: ignore[misc]
+    """Hears when the compiler goes from one step to the next, where it can be interrupted."""
+
+    def on_start(self, event: Any) -> None:  # noqa: ARG002 - as the compiler calls it
+        compiling.pause()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def _name(event: Any) -> str:
+    """The kernel that is compiled; empty for a function of others, which is part of one."""
+    dispatcher = event.data["dispatcher"]
+    is_ours = isinstance(getattr(dispatcher, "_cache", None), KernelCache)
+    return dispatcher.py_func.__qualname__ if is_ours else ""
+
+
+event.register("numba:compile", _Compiles())
+event.register("numba:run_pass", _Passes())

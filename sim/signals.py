@@ -4,15 +4,22 @@ Flight code may raise anything, KeyboardInterrupt too: that is its fault, and a 
 presses Ctrl-C, a CI system that cancels (SIGTERM) and a flight that takes too long must still get through.  So the
 handlers installed here raise exceptions of their own, and remember that they did, should flight code swallow them.
 
+While a kernel is compiled, the handlers raise nothing: the compiler calls back from C, where an exception is printed
+and lost.  What they have heard is raised at the compiler's next step.
+
 Python lets only the main thread have signal handlers; elsewhere the blocks below change nothing.
 """
 
+import math
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import NamedTuple
+
+from estimator import compiling
 
 ECHO_S = 0.5  # a second signal within this time is the same one: a terminal and a parent both pass it on
 REPEAT_S = 1.0  # between two reminders that the time is up
@@ -28,11 +35,27 @@ class TimedOut(BaseException):
     """The time for this flight is up."""
 
 
+class _Limit(NamedTuple):
+    """What a block may take, when it began, and what had been spent compiling by then; seconds."""
+
+    seconds: float
+    began_s: float
+    spent_s: float
+
+    @property
+    def left_s(self) -> float:
+        """What is left of it; compiling does not count."""
+        return self.seconds + (compiling.spent_s() - self.spent_s) - (time.monotonic() - self.began_s)
+
+
 class _Heard:
     """What the handlers of this process have heard."""
 
     at_s: float | None = None  # of the last signal that ends the command
     time_up = False
+    limit = _Limit(math.inf, 0.0, 0.0)
+    held: type[BaseException] | None = None  # what is to be raised at the compiler's next step
+    tell_extended: Callable[[float], None] | None = None
 
 
 _heard = _Heard()
@@ -63,10 +86,14 @@ def listening() -> Iterator[None]:
 
 @contextmanager
 def limited(seconds: float | None) -> Iterator[None]:
-    """Raise `TimedOut` when the block takes longer than `seconds`, None for ever, and again until it ends."""
+    """Raise `TimedOut` when the block takes longer than `seconds`, None for ever, and again until it ends.
+
+    The time in which kernels are compiled does not count.
+    """
     if seconds is None or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
         yield
         return
+    _heard.limit = _Limit(seconds, time.monotonic(), compiling.spent_s())
     before = signal.signal(signal.SIGALRM, _time_up)
     signal.setitimer(signal.ITIMER_REAL, seconds, REPEAT_S)
     try:
@@ -75,6 +102,11 @@ def limited(seconds: float | None) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
         _heard.time_up = False
+
+
+def on_extended(tell: Callable[[float], None] | None) -> None:
+    """Call `tell` with the seconds by which the time for a block ends later, for kernels had to be compiled."""
+    _heard.tell_extended = tell
 
 
 def check() -> None:
@@ -90,9 +122,33 @@ def _interrupt(_number: int, _frame: FrameType | None) -> None:
     if _heard.at_s is not None and now_s - _heard.at_s < ECHO_S:
         return
     _heard.at_s = now_s
-    raise Interrupted
+    _raise(Interrupted)
 
 
 def _time_up(_number: int, _frame: FrameType | None) -> None:
+    left_s = _heard.limit.left_s
+    if left_s > 0.0:
+        later_s = max(left_s, REPEAT_S)
+        signal.setitimer(signal.ITIMER_REAL, later_s, REPEAT_S)
+        if _heard.tell_extended is not None:
+            _heard.tell_extended(later_s)
+        return
     _heard.time_up = True
-    raise TimedOut
+    _raise(TimedOut)
+
+
+def _raise(what: type[BaseException]) -> None:
+    if compiling.busy():
+        _heard.held = what
+    else:
+        raise what
+
+
+def _raise_held() -> None:
+    """What `_raise` held back, once; in the main thread, where it was heard."""
+    if _heard.held is not None and threading.current_thread() is threading.main_thread():
+        what, _heard.held = _heard.held, None
+        raise what
+
+
+compiling.on_pause(_raise_held)

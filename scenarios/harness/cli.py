@@ -68,7 +68,7 @@ app = typer.Typer(
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     try:
-        with listening():
+        with listening(), console.compiling_told():
             code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
     except typer.TyperException as problem:
         console.error(problem.format_message())
@@ -192,7 +192,6 @@ def check(
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
             tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes, keyed=ledger is not None)
             kept = None if ledger is None else Ledger(ledger)
-            console.warn_if_cold()
             guard.stage("while it judged", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
                 run = gate.fly_all(tasks, workers or crew.processors(), advance, limit_s=limit_s, ledger=kept)
@@ -242,7 +241,6 @@ def compare(
             changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
             changes |= given({"withheld": withhold})
             plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
-            console.warn_if_cold()
             guard.stage("while it compared", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
                 compared = comparing.fly(plan, workers or crew.processors(), advance, limit_s=limit_s)
@@ -288,7 +286,6 @@ def claims(
             check_file(markdown)
             folder = claim_report.folder_of_pictures(markdown, pictures)
             numbers = None if seeds is None else gate.parse_seeds(seeds)
-            console.warn_if_cold()
             with console.progress("measuring", "claims") as advance:
                 findings = claim_run.measure(
                     wanted,
@@ -357,7 +354,6 @@ def bench(
     with reporting(json_) as report:
         from scenarios.harness import bench as benchmark
 
-        console.warn_if_cold()
         with usage(), console.progress("measuring", "pairs") as advance:
             speed = benchmark.measure(estimator, seconds, repeats, advance)
         benchmark.tell(speed)
@@ -413,7 +409,6 @@ def sensors(
             sensor_page.check_picture(picture)
             subject = sensor_names.subject(part)
             sensor_page.check_rates(subject, part)
-        console.warn_if_cold()
         with console.progress("lying still", "axis-hours") as advance:
             page = sensor_page.make(subject, advance)
         if picture is not None:

@@ -6,12 +6,17 @@ terminal, or where FORCE_COLOR is set, and never where NO_COLOR is.  Tables fit 
 
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Protocol
+
+from estimator import compiling
+from sim.wording import printable
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress
     from rich.table import Table
     from rich.text import Text
 
@@ -21,6 +26,8 @@ if TYPE_CHECKING:
 
 USAGE, INTERRUPTED = 2, 130  # exit codes, beside those of a verdict
 WIDTH = 80
+COMPILING = "compiling the kernels, once for this version: about half a minute"
+_bars: list["Progress"] = []  # on the screen now: what is written while one is there goes through its console
 
 
 def err() -> "Console":
@@ -47,12 +54,62 @@ def error(message: str) -> None:
     sys.stderr.write(f"wingslevel: {' '.join(message.split())}\n")
 
 
-def warn_if_cold() -> None:
-    """Say that the first flight of new sources compiles for a while."""
-    from estimator.jit import is_cold
+def note(line: str) -> None:
+    """One dim line on standard error."""
+    err().print(line, style="dim", soft_wrap=True)
 
-    if is_cold():
-        err().print("compiling the kernels, this once: about half a minute", style="dim")
+
+@contextmanager
+def compiling_told() -> Iterator[None]:
+    """Say, once inside the block, when kernels begin to be compiled; on a terminal count them while it lasts."""
+    shown = _Compiling()
+    before = compiling.on_compile(shown)
+    compiling.on_trouble(lambda line: error(f"kernel cache: {printable(line)}"))
+    try:
+        yield
+    finally:
+        shown.clear()
+        compiling.on_compile(before)
+        compiling.on_trouble(None)
+
+
+class _Compiling:
+    """Hears of each kernel that is compiled."""
+
+    def __init__(self) -> None:
+        self._began_s: float | None = None
+        self._first = 0
+        self._drawn = False
+
+    def __call__(self, progress: compiling.Progress) -> None:
+        with suppress(OSError, ValueError):  # nobody reads standard error: that is no reason not to compile
+            if self._began_s is None:
+                self._began_s, self._first = time.monotonic(), progress.compiled
+                console = _bars[-1].console if _bars else err()
+                console.print(COMPILING, style="dim", soft_wrap=True)
+            self._count(progress, time.monotonic() - self._began_s)
+
+    def clear(self) -> None:
+        """Wipe the count away."""
+        if self._drawn:
+            self._drawn = False
+            with suppress(OSError, ValueError):
+                sys.stderr.write("\r\x1b[K")
+                sys.stderr.flush()
+
+    def _count(self, progress: compiling.Progress, seconds: float) -> None:
+        count = f"{progress.compiled - self._first} kernels compiled, {seconds:.0f} s"
+        if _bars:
+            bar = _bars[-1]
+            for task in bar.tasks:
+                what = task.fields["what"]
+                bar.update(task.id, description=f"{what} ({count})" if progress.active else what)
+        elif err().is_terminal and progress.active:
+            self._drawn = True
+            sys.stderr.write(f"\r\x1b[K{count}")
+            sys.stderr.flush()
+        else:
+            self.clear()
 
 
 def note_left_out(scenarios: Sequence[str]) -> None:
@@ -227,5 +284,9 @@ def progress(what: str, unit: str) -> Iterator[Advance]:
         TimeElapsedColumn(),
     ]
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task(what, total=1.0)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+        task = bar.add_task(what, total=1.0, what=what)
+        _bars.append(bar)
+        try:
+            yield lambda done, total: bar.update(task, completed=done, total=total)
+        finally:
+            _bars.remove(bar)

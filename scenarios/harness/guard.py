@@ -27,7 +27,7 @@ from types import FrameType
 from typing import Any, NamedTuple
 
 from sim.processes import end_with_parent
-from sim.signals import ENDING, listening
+from sim.signals import ENDING, listening, on_extended
 from sim.wording import described
 
 FAILED, USAGE, BROKEN = 1, 2, 3  # exit codes
@@ -99,9 +99,15 @@ def guarded(command: Callable[[], int]) -> int:
 def watched(what: str, limit_s: float | None = None) -> Iterator[None]:
     """Should the process end inside the block, or be at it for longer than `limit_s`: `what` is lost, and no more."""
     _send(watched=what, limit_s=limit_s)
+
+    def extend(seconds: float) -> None:
+        _send(watched=what, limit_s=seconds + GRACE_S)
+
+    on_extended(extend)
     try:
         yield
     finally:
+        on_extended(None)
         _send(watched="", limit_s=None)
 
 

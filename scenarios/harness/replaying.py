@@ -97,7 +97,6 @@ def run(
         make(name, of_each[name])
     recording.check_writable(into)
     log = logs.read(path, reference=reference, columns=columns, imu=imu)
-    console.warn_if_cold()
     replays, folders = [], {}
     for name in names:
         with console.progress(f"replaying {name}", "") as advance:

@@ -81,7 +81,6 @@ def fly(
         outcome = Outcome.TIMED_OUT if timed_out else Outcome.WORKER_DIED
         gone = FlightVerdict(scenario.name, config.estimator, config.seed, outcome, (), {}, f"the process {message}")
         return Flown(scenario, None, gone, None)
-    console.warn_if_cold()
     live_view = viewing.live(scenario.name, config, web=web) if live else None
     with console.progress(f"flying {scenario.name}", "s") as advance:
 

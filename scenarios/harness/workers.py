@@ -19,11 +19,13 @@ from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Generic, Protocol, TypeVar
 
+from estimator import compiling
+from scenarios.harness import console
 from scenarios.harness.guard import GRACE_S
 from scenarios.harness.plugins import PluginError
 from sim.log import Outcome
 from sim.processes import end_with_parent
-from sim.signals import Interrupted, TimedOut, limited
+from sim.signals import Interrupted, TimedOut, limited, on_extended
 from sim.wording import described
 
 LIVES = 2  # processes that a task may cost before it is lost
@@ -80,7 +82,8 @@ def processors() -> int:
 def _results(tasks: Sequence[Flyable[_Result]], workers: int, limit_s: float | None) -> Iterator[tuple[int, _Result]]:
     """Number and result of each task, as they come."""
     waiting, lives = deque(range(len(tasks))), [LIVES] * len(tasks)
-    crew: list[_Worker[_Result]] = [_Worker(limit_s) for _ in range(workers)]
+    told = multiprocessing.get_context("spawn").Value("b", compiling.compiled() > 0)
+    crew: list[_Worker[_Result]] = [_Worker(limit_s, told) for _ in range(workers)]
     try:
         while waiting or any(worker.busy for worker in crew):
             for worker in crew:
@@ -129,15 +132,17 @@ class _Told(Generic[_Result]):
 class _Worker(Generic[_Result]):
     """One process, begun anew when it is gone, and the task that it is at."""
 
-    def __init__(self, limit_s: float | None) -> None:
+    def __init__(self, limit_s: float | None, told: Any) -> None:
         self.number = -1  # of the task
         self.busy = False
         self.future: Future[Any] | None = None
         self.deadline_s: float | None = None
         self._limit_s = limit_s
+        self._told = told  # shared by all processes: whether somebody has said that kernels are being compiled
         self._task: Flyable[_Result] | None = None
         self._pool: ProcessPoolExecutor | None = None
         self._process: Any = None
+        self._extended_s: Any = None  # shared with the process: what the compiler took of the time of its task
 
     def take(self, number: int, task: Flyable[_Result]) -> None:
         """Begin with a task; the time that a new process takes to start does not count."""
@@ -145,7 +150,10 @@ class _Worker(Generic[_Result]):
         if self._pool is None:
             # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
             context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
-            self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_set_up)
+            self._extended_s = context.Value("d", 0.0)
+            self._pool = ProcessPoolExecutor(
+                1, mp_context=context, initializer=_set_up, initargs=(self._extended_s, self._told)
+            )
             with _held_back():
                 self.future = self._pool.submit(os.getpid)
             self._process = next(iter(set(multiprocessing.active_children()) - others), None)
@@ -157,7 +165,10 @@ class _Worker(Generic[_Result]):
         if self.future is None:
             return None
         if not self.future.done():
-            if self.deadline_s is None or time.monotonic() < self.deadline_s:
+            if self.deadline_s is None:
+                return None
+            self.deadline_s += self._take_extension_s()
+            if time.monotonic() < self.deadline_s:
                 return None
             self.end()
             return _Gone(True, f"took longer than {self._limit_s:g} s and did not answer")
@@ -191,6 +202,12 @@ class _Worker(Generic[_Result]):
         self.future, self._task = self._pool.submit(_fly, self._task, self._limit_s), None
         self.deadline_s = None if self._limit_s is None else time.monotonic() + self._limit_s + GRACE_S
 
+    def _take_extension_s(self) -> float:
+        with self._extended_s.get_lock():
+            extended_s = float(self._extended_s.value)
+            self._extended_s.value = 0.0
+        return extended_s
+
     def _await_end(self) -> None:
         if self._process is not None:
             self._process.join(GRACE_S)
@@ -216,9 +233,23 @@ def _how(exitcode: int | None) -> str:
     return "ended by itself" + ("" if exitcode is None else f" (exit code {exitcode})")
 
 
-def _set_up() -> None:
+def _set_up(extended_s: Any, told: Any) -> None:
     """In a new process."""
     end_with_parent()
+
+    def extend(seconds: float) -> None:
+        extended_s.value += seconds
+
+    def tell(_progress: compiling.Progress) -> None:
+        with told.get_lock():
+            first, told.value = not told.value, True
+        if first:
+            console.note(console.COMPILING)
+        compiling.on_compile(None)
+
+    on_extended(extend)
+    compiling.on_compile(tell)
+    compiling.on_trouble(lambda line: console.error(f"kernel cache: {line}"))
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)  # a dead process, not a flight that was interrupted
     with contextlib.suppress(OSError):
