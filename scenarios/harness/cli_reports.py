@@ -1,14 +1,15 @@
 """What every command does alike: refuse in one line what it cannot do, and write its reports, whole or not at all."""
 
-import json
 import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import typer
+
+from sim.wording import json_text
 
 
 @contextmanager
@@ -30,17 +31,24 @@ def reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
     """Gives what writes the JSON.  Where that goes to standard output, everything else goes to standard error."""
     if target == "-":
         stdout = sys.stdout
+        if stdout is None:
+            raise refusal("--json -: standard output is closed")
         with redirect_stdout(sys.stderr):
-            yield lambda data: print(_text(data), file=stdout)
+            yield lambda data: _print(data, stdout)
     else:
         path = Path(target) if target is not None else None
         with usage():
             check_file(path)
-        yield lambda data: write(path, lambda: _text(data) + "\n")
+        yield lambda data: write(path, lambda: json_text(data) + "\n")
 
 
-def _text(data: Any) -> str:
-    return json.dumps(data, indent=2, allow_nan=False)
+def _print(data: Any, stdout: TextIO) -> None:
+    try:
+        print(json_text(data), file=stdout, flush=True)
+    except BrokenPipeError:  # whoever read it has seen enough: what is still in the buffer goes nowhere, quietly
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stdout.fileno())
+    except OSError as error:
+        raise refusal(f"cannot write the JSON to standard output: {error.strerror}") from error
 
 
 def check_file(path: Path | None) -> None:
@@ -72,7 +80,10 @@ def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
     data = made.encode("utf-8") if isinstance(made, str) else made
     target = path.resolve()  # what a link points to is replaced, not the link
     if _is_stream(target):
-        target.write_bytes(data)
+        try:
+            target.write_bytes(data)
+        except OSError as error:
+            raise refusal(f"cannot write to {path}: {error.strerror}") from error
         return
     with usage(), replacing(target) as temporary:
         temporary.write_bytes(data)

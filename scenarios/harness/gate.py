@@ -15,8 +15,6 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from rich.text import Text
-
 from scenarios.harness import console
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.preflight import prepared
@@ -90,10 +88,10 @@ def tell(verdict: Verdict) -> None:
                 for row in flight.rows
                 if not row.passed
             )
-            why = f"{flight.outcome.replace('_', ' ')}: {flight.message}" if flight.message else failed
-            out.print(Text(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red"), soft_wrap=True)
+            why = flight.ending if flight.message or flight.broken else failed
+            console.line(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red")
     flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))
-    out.print(f"passed: {flights} flights, {pooled} scenarios pooled")
+    console.last(f"passed: {flights} flights, {pooled} scenarios pooled")
 
 
 def parse_seeds(text: str) -> list[int]:

@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rich.text import Text
-
 from estimator.instruments import to_json
 from scenarios.harness import console, viewing
 from scenarios.harness.config import FlightConfig
@@ -85,14 +83,14 @@ def tell(flown: Flown) -> None:
         f"{flight.outcome.replace('_', ' ')} {len(flight.log) * flight.dt_s - flight.release_s:.1f} s after the release"
     )
     planned = flight.outcome == Outcome.COMPLETED
-    out.print(
-        Text(f"{ended}: {flight.message}" if flight.message else ended, "" if planned else "bold red"), soft_wrap=True
-    )
+    console.line(f"{ended}: {flight.message}" if flight.message else ended, "" if planned else "bold red")
     for event in flight.events:
         if event.level == "warn":
-            out.print(Text(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow"), soft_wrap=True)
+            console.line(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow")
     console.print_known({judged.estimator: judged.known})
-    out.print(Text(f"recording   {flown.folder}\nto see it   wingslevel view {flown.folder}"), soft_wrap=True)
+    console.line(f"recording   {flown.folder}")
+    console.line(f"to see it   wingslevel view {flown.folder}")
+    console.outcome(f"passed: {sum(row.passed for row in judged.rows)} of {len(judged.rows)} checks")
 
 
 def _free_folder(into: Path, scenario: str, config: FlightConfig) -> Path:
