@@ -32,6 +32,14 @@ def escaped(text: str, kept: str = "\xa0") -> str:
     return "".join(c if c.isprintable() or c in kept else _escaped(c) for c in text)
 
 
+def brief(value: Any) -> str:
+    """A value as messages show it: as Python writes it, on one printable line, cut where it is long."""
+    try:
+        return printable(repr(value), 60)
+    except (ValueError, RecursionError):  # thousands of digits, or of brackets
+        return f"{type(value).__name__} of great length"
+
+
 def described(error: BaseException) -> str:
     """An exception on one printable line, ``ValueError: its text``; one that cannot say what it is says so."""
     try:

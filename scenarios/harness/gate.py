@@ -16,13 +16,14 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 from scenarios.harness import console
+from scenarios.harness.config import LARGEST_SEED
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find, matching
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Outcome
 
-LARGEST_SEED = 2**32 - 1
+MOST_SEEDS, MOST_FLIGHTS = 10_000, 100_000  # of one command
 _Result = TypeVar("_Result")
 _Told = TypeVar("_Told", covariant=True)
 
@@ -69,6 +70,10 @@ def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, cha
         wanted = [name for name in wanted if name not in left_out]
         if not wanted:
             raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
+    if len(wanted) * len(seeds) > MOST_FLIGHTS:
+        raise ValueError(
+            f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
+        )
     for name in wanted:
         _, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
         console.warn_of_faults(name, config)
@@ -104,14 +109,14 @@ def parse_seeds(text: str) -> list[int]:
     right = "write numbers and ranges, for instance 0-9 or 0,2,5-7"
     seeds: dict[int, None] = {}
     for part in text.split(","):
-        found = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)
+        found = re.fullmatch(r" *([0-9]{1,20})(?:-([0-9]{1,20}))? *", part)
         if not found:
             raise ValueError(f"seeds = {text!r}: {right}")
         first, last = int(found[1]), int(found[2] or found[1])
         if not first <= last <= LARGEST_SEED:
             raise ValueError(f"seeds = {text!r}: {part.strip()} is no range of seeds from 0 to {LARGEST_SEED}; {right}")
-        if last - first >= 1_000_000:
-            raise ValueError(f"seeds = {text!r}: {last - first + 1} flights at once are too many; split them")
+        if last - first + len(seeds) >= MOST_SEEDS:
+            raise ValueError(f"seeds = {text!r}: more than {MOST_SEEDS} at once are too many; split them")
         seeds |= dict.fromkeys(range(first, last + 1))
     return list(seeds)
 
