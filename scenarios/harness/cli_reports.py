@@ -3,9 +3,9 @@
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import IO, Any, TextIO
 
 import typer
 
@@ -19,6 +19,8 @@ def usage() -> Iterator[None]:
         yield
     except ValueError as problem:
         raise refusal(str(problem)) from problem
+    except OSError as problem:  # a name that is too long, a folder that may not be looked into
+        raise refusal(f"{problem.filename or 'cannot read or write'}: {problem.strerror or problem}") from problem
 
 
 def refusal(message: str) -> typer.TyperException:
@@ -46,9 +48,18 @@ def _print(data: Any, stdout: TextIO) -> None:
     try:
         print(json_text(data), file=stdout, flush=True)
     except BrokenPipeError:  # whoever read it has seen enough: what is still in the buffer goes nowhere, quietly
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stdout.fileno())
+        abandon(stdout)
     except OSError as error:
+        abandon(stdout)
         raise refusal(f"cannot write the JSON to standard output: {error.strerror}") from error
+
+
+def abandon(stream: IO[str]) -> None:
+    """Send what is still in the buffer of a stream that cannot be written to nowhere, quietly."""
+    with suppress(OSError, ValueError):  # it may be no file
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 def check_file(path: Path | None) -> None:

@@ -13,6 +13,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from scenarios.harness.cli_reports import abandon, refusal
 from sim.wording import escaped, printable
 
 LEAST = 20  # columns that a terminal is taken to have at least; on fewer its own line breaks do
@@ -27,7 +28,15 @@ class Terminal(Console):
 
     def print(self, *objects: Any, crop: bool = False, **options: Any) -> None:
         """As rich does, but a line that is too long is left to the terminal to break."""
-        super().print(*objects, crop=crop, **options)
+        try:
+            super().print(*objects, crop=crop, **options)
+        except OSError as error:
+            abandon(self.file)
+            raise refusal(f"cannot write to standard output: {error.strerror}") from error
+
+    def on_broken_pipe(self) -> None:
+        """Whoever read it has seen enough: the rest is for nobody, and the exit code stays that of the command."""
+        abandon(self.file)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """As rich does, with control characters and the like written as their escapes."""
