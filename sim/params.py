@@ -1,10 +1,13 @@
 """Parameter dataclasses by name: their fields with dots, values of the right type, and what a wrong name may mean."""
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from sim.wording import brief
 
 T = TypeVar("T")
 _MOST_TOLD = 60  # names in one message; of more, those that begin alike are told as one
@@ -119,7 +122,7 @@ def _change(params: Any, rest: str, value: Any, name: str, what: str) -> Any:
 
 def shown(name: str, value: Any) -> str:
     """A field with its value and unit, as messages name it."""
-    return f"{name} = {value!r} {unit_of(name)}".rstrip()
+    return f"{name} = {brief(value)} {unit_of(name)}".rstrip()
 
 
 def typed(value: Any, hint: Any) -> Any:
@@ -164,8 +167,11 @@ def _one_of(value: Any, choices: tuple[Any, ...]) -> Any:
 
 
 def _number(value: Any, kind: type) -> Any:
-    number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
-    if number is None or (kind is int and not number.is_integer()):
+    try:
+        number = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    except OverflowError:  # hundreds of digits
+        number = math.nan
+    if math.isnan(number) or (kind is int and not number.is_integer()):
         raise ValueError(f"must be a {'whole number' if kind is int else 'number'}")
     return kind(number)
 

@@ -1,6 +1,18 @@
-"""Text from other people's code and files, made safe to print: one line, no control characters, valid UTF-8."""
+"""Text from other people's code, options and files, made safe for where it is written.
+
+Any text may hold anything: control characters and escape sequences, lone surrogates (of a file name that is no UTF-8),
+characters that turn the direction of writing, markup.  `printable` is for the terminal, XML and a picture's labels,
+and what the other functions start from; `markdown` for Markdown, `plotted` for matplotlib, `json_text` for JSON.
+"""
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from typing import Any
 
 LONGEST = 400  # characters of a message; the rest is counted
+_MARKS = re.compile(r"([\\`*\[\]|~$#!])|(?<![^\W_])_|_(?![^\W_])")  # an underscore between letters marks nothing
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
@@ -9,8 +21,23 @@ def printable(text: str, longest: int = LONGEST) -> str:
     White space becomes single spaces.  Control characters, lone surrogates and characters that turn the direction of
     writing are escaped; what is longer than `longest` characters is cut, and says how long it was.
     """
-    line = "".join(c if c.isprintable() else _escaped(c) for c in " ".join(text.split()))
+    line = escaped(" ".join(text.split()))
     return line if len(line) <= longest else f"{line[:longest]}... ({len(line)} characters)"
+
+
+def escaped(text: str, kept: str = "\xa0") -> str:
+    """`text` with everything that is not printable written as its escape, a line break as ``\n``; blanks stay."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() or c in kept else _escaped(c) for c in text)
+
+
+def brief(value: Any) -> str:
+    """A value as messages show it: as Python writes it, on one printable line, cut where it is long."""
+    try:
+        return printable(repr(value), 60)
+    except (ValueError, RecursionError):  # thousands of digits, or of brackets
+        return f"{type(value).__name__} of great length"
 
 
 def described(error: BaseException) -> str:
@@ -20,6 +47,42 @@ def described(error: BaseException) -> str:
     except BaseException as fault:  # it is anyone's class
         return f"{printable(type(error).__name__)}: no message (its __str__ raises {printable(type(fault).__name__)})"
     return f"{printable(type(error).__name__)}: {printable(text) or 'no message'}"
+
+
+def markdown(text: str, longest: int = LONGEST) -> str:
+    """`text` as Markdown that reads as `text` does: in a line, a heading or a cell of a table; HTML stays text."""
+    line = _MARKS.sub(lambda found: f"\\{found[0]}", printable(text, longest))
+    return line.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+
+
+def plotted(text: str, longest: int = 80) -> str:
+    """`text` as a label of matplotlib, to which dollars would be mathematics."""
+    return printable(text, longest).replace("$", r"\$")
+
+
+def json_text(data: Any) -> str:
+    """`data` as JSON that every strict reader accepts, in ASCII.
+
+    Lone surrogates, which are no Unicode text, are written as text of their escape, ``\\udcff``; numbers that are not
+    finite become null.
+    """
+    return json.dumps(_strict(data), indent=2, allow_nan=False)
+
+
+def _strict(data: Any) -> Any:
+    if isinstance(data, str):
+        return _without_surrogates(data)
+    if isinstance(data, float):
+        return data if math.isfinite(data) else None
+    if isinstance(data, Mapping):
+        return {_without_surrogates(str(name)): _strict(value) for name, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_strict(value) for value in data]
+    return data
+
+
+def _without_surrogates(text: str) -> str:
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _escaped(character: str) -> str:

@@ -13,11 +13,12 @@ from sim.air import Air, Gust, Thermals
 from sim.air.dryden import SEVERITIES_M_S
 from sim.air.gust import STRONGEST_M_S
 from sim.air.thermal import MOST, place
+from sim.numbers import number
 from sim.rng import stream
 
 FASTEST_WIND_M_S = 30.0
 GUST_LENGTH_S = 2.0
-_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
+_NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
 _GUST = re.compile(rf"({_NUMBER})@({_NUMBER})s?(?:/({_NUMBER})s?)?(?::(up|down|along|across|{_NUMBER}))?")
 Degrees = Annotated[float, Field(ge=0.0, le=360.0)]
 FromWord = Literal["random", "cross", "head", "tail"]
@@ -86,7 +87,7 @@ class AirConfig(_Model):
     def _typed_thermals(cls, thermals: Any) -> Any:
         if isinstance(thermals, list | tuple) and len(thermals) <= MOST:
             return thermals
-        if not re.fullmatch(r"\d{1,6}", str(thermals).strip()) or int(thermals) > MOST:
+        if not re.fullmatch(r"[0-9]{1,6}", str(thermals).strip()) or int(thermals) > MOST:
             raise ValueError(f"thermals = {thermals!r}: write how many, a whole number from 0 to {MOST}")
         return int(thermals)
 
@@ -111,7 +112,7 @@ def parse_wind(text: str) -> Wind:
     tidy = text.strip().lower()
     if tidy in ("0", "calm"):
         return Wind(0.0, 0.0)
-    found = re.fullmatch(r"(\d+(?:\.\d*)?|\.\d+)@(random|cross|head|tail|\d+(?:\.\d*)?)", tidy)
+    found = re.fullmatch(r"([0-9]+(?:\.[0-9]*)?|\.[0-9]+)@(random|cross|head|tail|[0-9]+(?:\.[0-9]*)?)", tidy)
     right = "write speed@direction it comes from, for instance 5@270, 5@random, 5@cross, 5@head or 5@tail, or calm"
     if not found:
         raise ValueError(f"wind = {text!r}: {right}")
@@ -168,7 +169,7 @@ def parse_turbulence(text: str) -> float:
     if tidy in SEVERITIES_M_S:
         return SEVERITIES_M_S[tidy]
     try:
-        return float(tidy)
+        return number(tidy)
     except ValueError:
         words = ", ".join(SEVERITIES_M_S)
         raise ValueError(f"turbulence = {text!r}: write {words}, or the wind at 20 ft in m/s, for instance 3") from None

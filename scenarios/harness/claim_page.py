@@ -6,6 +6,7 @@ from scenarios.harness import console
 from scenarios.harness.checks import Row
 from scenarios.harness.claim import Finding, Verdict, deciding
 from scenarios.harness.claim_run import Found
+from sim.wording import markdown
 
 MARKS = {Verdict.CONFIRMED: "✅", Verdict.WITH_CONDITION: "🟡", Verdict.REFUTED: "❌"}
 
@@ -92,7 +93,6 @@ def _row(row: Row) -> str:
 
 def _cells(row: Row) -> str:
     """Name, measured value and limit, with units, as three cells."""
-    unit = f" {row.unit}" if row.unit else ""
+    unit = f" {markdown(row.unit)}" if row.unit else ""
     limit = f"{'≤' if row.sense == '<=' else '≥'} {console.figures(row.limit)}{unit}"
-    name = row.name.replace("|", r"\|")  # a bar would end the cell
-    return f"{name} | {console.figures(row.measured)}{unit} | {limit}"
+    return f"{markdown(row.name)} | {console.figures(row.measured)}{unit} | {limit}"

@@ -69,7 +69,7 @@ def tell(findings: Findings, *, detailed: bool) -> None:
             of_it = [found for found in findings.found if found.claim.paper == paper]
             out.print(console.claim_table(paper.short, [_cells(found) for found in of_it]))
     verdicts = [found.finding.verdict for found in findings.found if found.finding]
-    out.print(", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in Verdict))
+    console.last(", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in Verdict))
     for found in findings.found:
         if found.finding is None:
             console.error(f"claim {found.name}: {found.problem}")

@@ -1,4 +1,4 @@
-"""The command line: ``wingslevel list | fly | check | compare | claims | replay | bench | aircraft | ...``.
+"""The command line: ``wingslevel list | fly | check | agree | compare | claims | replay | bench | aircraft | ...``.
 
 Exit codes: 0 passed, 1 a check failed, 2 usage or configuration, 3 the simulation blew up, 130 interrupted.  A
 problem of usage or configuration is one line on standard error, found before anything is flown or written.  Heavy
@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from scenarios.harness import cli_values as complete
 from scenarios.harness import console, guard
 from scenarios.harness.cli_options import (
     FLIGHT_TIMEOUT_S,
@@ -31,6 +32,7 @@ from scenarios.harness.cli_options import (
     MarkdownOption,
     ParameterOption,
     ReferenceOption,
+    ScenarioArgument,
     SensorsOption,
     SetOption,
     SeveralOption,
@@ -47,9 +49,9 @@ from scenarios.harness.cli_options import (
     fitted,
     given,
     names_of,
-    time_limit,
 )
 from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
+from scenarios.harness.cli_values import Commands, number_in, whole_in
 from scenarios.harness.console import INTERRUPTED, USAGE
 from sim.signals import listening
 
@@ -58,7 +60,7 @@ FLIGHTS = Path("flights")  # where recordings go unless told otherwise
 app = typer.Typer(
     name="wingslevel",
     help="Fly a model aeroplane on an attitude estimate, through wind, and judge both.",
-    add_completion=False,
+    cls=Commands,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -67,6 +69,7 @@ app = typer.Typer(
 
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
+    console.be_tolerant()
     try:
         with listening(), console.compiling_told():
             code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
@@ -84,7 +87,11 @@ def run(arguments: list[str]) -> int:
 def _root(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and stop.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print errors and how it went, no more; also after the command.")
+    ] = False,
 ) -> None:
+    console.be_quiet(quiet)
     if version:
         typer.echo(f"wingslevel {version_of('wingslevel')}")
         raise typer.Exit
@@ -106,7 +113,7 @@ def list_(json_: JsonOption = None) -> None:
 
 @app.command()
 def fly(
-    scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
+    scenario: ScenarioArgument,
     estimator: EstimatorOption = None,
     aircraft: AircraftOption = None,
     autopilot: AutopilotOption = None,
@@ -119,9 +126,17 @@ def fly(
     imu_rate: ImuRateOption = None,
     sensors: SensorsOption = None,
     fault: FaultOption = None,
-    duration: Annotated[float | None, typer.Option(metavar="S", help="Length of the flight after the release.")] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Length of the flight after the release.", parser=number_in(-1e9, 1e9, "s")),
+    ] = None,
     seed: Annotated[
-        int | None, typer.Option(help="Another seed, another flight; the same seed, the same bits. [default: 0]")
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Another seed, another flight; the same seed, the same bits. [default: 0]",
+            parser=whole_in(-(10**18), 10**18),
+        ),
     ] = None,
     set_: SetOption = None,
     withhold: WithholdOption = None,
@@ -141,7 +156,7 @@ def fly(
     with reporting(json_) as report:
         with usage():
             changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
-            limit_s = None if live else time_limit(flight_timeout)
+            limit_s = None if live else flight_timeout
             flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web, limit_s=limit_s)
         report(flown.to_json())
         single.tell(flown)  # last: a reader who closes the pipe loses no report
@@ -152,7 +167,10 @@ def fly(
 
 @app.command()
 def check(
-    names: Annotated[list[str] | None, typer.Argument(help="Scenarios; all of them where none is named.")] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="Scenarios; all of them where none is named.", autocompletion=complete.scenarios),
+    ] = None,
     seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")] = "0-9",
     estimator: EstimatorOption = None,
     wind: WindOption = None,
@@ -182,7 +200,6 @@ def check(
 
     with reporting(json_) as report:
         with usage():
-            limit_s = time_limit(flight_timeout)
             for path in (junit, markdown):
                 check_file(path)
             named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
@@ -194,7 +211,7 @@ def check(
             kept = None if ledger is None else Ledger(ledger)
             guard.stage("while it judged", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
-                run = gate.fly_all(tasks, workers or crew.processors(), advance, limit_s=limit_s, ledger=kept)
+                run = gate.fly_all(tasks, workers or crew.processors(), advance, limit_s=flight_timeout, ledger=kept)
         write(junit, run.verdict.to_junit)
         write(markdown, run.verdict.to_markdown)
         report(run.to_json())
@@ -203,8 +220,38 @@ def check(
 
 
 @app.command()
+def agree(
+    first: Annotated[Path, typer.Argument(help="What check --json wrote.")],
+    second: Annotated[Path, typer.Argument(help="The same of another machine.")],
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            metavar="REL",
+            help="Relative; those of each unit keep their proportion to it. 0 demands equal values.",
+            parser=number_in(0.0, 10.0, ""),
+        ),
+    ] = 0.05,
+    report_only: Annotated[
+        str,
+        typer.Option(metavar="NAME,...", help="Scenarios, or patterns, whose values are not judged; none for none."),
+    ] = "faults",
+    json_: JsonOption = None,
+) -> int:
+    """Compare the verdicts of two machines: the same flights, the same outcomes, values within a tolerance."""
+    from scenarios.harness import agreement
+
+    with reporting(json_) as report:
+        with usage():
+            reported = [] if report_only == "none" else names_of(report_only)
+            compared = agreement.compare(agreement.read(first), agreement.read(second), tolerance, reported)
+        report(compared.to_json())
+        agreement.tell(compared)  # last: a reader who closes the pipe loses no file
+    return compared.exit_code
+
+
+@app.command()
 def compare(
-    scenario: Annotated[str, typer.Argument(help="Name of a scenario, or file.py with one's own.")],
+    scenario: ScenarioArgument,
     estimators: SeveralOption = None,
     seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds that each of them flies: 0-9 or 0,2,5-7.")] = "0-9",
     wind: WindOption = None,
@@ -233,7 +280,6 @@ def compare(
 
     with reporting(json_) as report:
         with usage():
-            limit_s = time_limit(flight_timeout)
             check_file(picture)
             check_file(markdown)
             handbook.check_picture(picture)
@@ -243,7 +289,7 @@ def compare(
             plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
             guard.stage("while it compared", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
-                compared = comparing.fly(plan, workers or crew.processors(), advance, limit_s=limit_s)
+                compared = comparing.fly(plan, workers or crew.processors(), advance, limit_s=flight_timeout)
         if picture is not None:
             from scenarios.harness import compare_picture
 
@@ -257,7 +303,10 @@ def compare(
 
 @app.command()
 def claims(
-    names: Annotated[list[str] | None, typer.Argument(help="Claims, or patterns as offset*; all by default.")] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="Claims, or patterns as offset*; all by default.", autocompletion=complete.claims),
+    ] = None,
     seeds: Annotated[
         str | None, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7. [default: of each claim]")
     ] = None,
@@ -277,7 +326,6 @@ def claims(
 
     with reporting(json_) as report:
         with usage():
-            limit_s = time_limit(flight_timeout)
             wanted = matching(names or [])
             if list_only:
                 report(claim_report.listed(wanted))
@@ -293,7 +341,7 @@ def claims(
                     workers or crew.processors(),
                     advance,
                     drawn=folder is not None,
-                    limit_s=limit_s,
+                    limit_s=flight_timeout,
                 )
         claim_report.write_all(findings, markdown, folder)
         report(findings.to_json())
@@ -312,8 +360,13 @@ def replay(
     set_: ParameterOption = None,
     withhold: WithholdOption = None,
     calibration: CalibrationOption = None,
-    airborne: Annotated[float, typer.Option(metavar="M/S", help="Ground speed above which it flies.")] = 5.0,
-    settle: Annotated[float, typer.Option(metavar="S", help="Not judged after it first flew.")] = 10.0,
+    airborne: Annotated[
+        float,
+        typer.Option(metavar="M/S", help="Ground speed above which it flies.", parser=number_in(0.0, 1000.0, "m/s")),
+    ] = 5.0,
+    settle: Annotated[
+        float, typer.Option(metavar="S", help="Not judged after it first flew.", parser=number_in(0.0, 1e6, "s"))
+    ] = 10.0,
     out: Annotated[Path, typer.Option(help="Folder for the recordings.")] = FLIGHTS,
     no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
     json_: JsonOption = None,
@@ -343,11 +396,14 @@ def replay(
 
 @app.command()
 def bench(
-    estimator: Annotated[
-        str, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
-    ] = "premerlani",
-    seconds: Annotated[float, typer.Option(min=2.0, metavar="S", help="Simulated time of each repeat.")] = 30.0,
-    repeats: Annotated[int, typer.Option(min=3, help="Pairs of closed loop and bare JSBSim.")] = 20,
+    estimator: EstimatorOption = "premerlani",
+    seconds: Annotated[
+        float,
+        typer.Option(metavar="S", help="Simulated time of each repeat.", parser=number_in(2.0, 3600.0, "s")),
+    ] = 30.0,
+    repeats: Annotated[
+        int, typer.Option(metavar="N", help="Pairs of closed loop and bare JSBSim.", parser=whole_in(3, 1000))
+    ] = 20,
     json_: JsonOption = None,
 ) -> int:
     """Speed: the closed loop against bare JSBSim in the same run, and the estimator alone."""
@@ -355,7 +411,7 @@ def bench(
         from scenarios.harness import bench as benchmark
 
         with usage(), console.progress("measuring", "pairs") as advance:
-            speed = benchmark.measure(estimator, seconds, repeats, advance)
+            speed = benchmark.measure(estimator or "premerlani", seconds, repeats, advance)
         benchmark.tell(speed)
         report(speed.to_json())
     return 0 if speed.passed else 1
@@ -363,7 +419,7 @@ def bench(
 
 @app.command()
 def aircraft(
-    name: Annotated[str, typer.Argument(help="Name of an aircraft.")],
+    name: Annotated[str, typer.Argument(help="Name of an aircraft.", autocompletion=complete.aircraft)],
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
     json_: JsonOption = None,
 ) -> None:
@@ -387,7 +443,11 @@ def aircraft(
 @app.command()
 def sensors(
     part: Annotated[
-        str | None, typer.Argument(help="Name of a part or of a suite, or part.toml with one's own; all, where none.")
+        str | None,
+        typer.Argument(
+            help="Name of a part or of a suite, or part.toml with one's own; all, where none.",
+            autocompletion=complete.suites_and_parts,
+        ),
     ] = None,
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
     json_: JsonOption = None,

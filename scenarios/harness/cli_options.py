@@ -1,15 +1,30 @@
 """The options that several commands take, and what they change in the configuration of a flight."""
 
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from scenarios.harness import cli_values as complete
 from scenarios.harness.cli_reports import refusal
+from scenarios.harness.cli_values import number_in, whole_in
+from sim.wording import brief
 
-EstimatorOption = Annotated[
-    str | None, typer.Option("--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.")
+# Each takes a few hundred megabytes; more of them than processors only wait for one another.
+MOST_WORKERS = max(64, 4 * (os.cpu_count() or 1))
+
+ScenarioArgument = Annotated[
+    str,
+    typer.Argument(help="Name of a scenario, or file.py with one's own.", autocompletion=complete.scenarios),
 ]
+EstimatorOption = Annotated[
+    str | None,
+    typer.Option(
+        "--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.",
+        autocompletion=complete.estimators,
+    ),
+]  # fmt: skip
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
@@ -35,18 +50,33 @@ TurbulenceOption = Annotated[
 ThermalsOption = Annotated[
     str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
 ]
-AircraftOption = Annotated[str | None, typer.Option("--aircraft", help="Name of an aircraft.")]
+AircraftOption = Annotated[
+    str | None, typer.Option("--aircraft", help="Name of an aircraft.", autocompletion=complete.aircraft)
+]
 AutopilotOption = Annotated[
-    str | None, typer.Option("--autopilot", help="Registered name, module:Class or file.py:Class.")
+    str | None,
+    typer.Option(
+        "--autopilot", help="Registered name, module:Class or file.py:Class.", autocompletion=complete.autopilots
+    ),
 ]
 GpsRateOption = Annotated[
-    float | None, typer.Option("--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.")
-]
+    float | None,
+    typer.Option(
+        "--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.",
+        parser=number_in(-1e6, 1e6, "Hz"),
+    ),
+]  # fmt: skip
 ImuRateOption = Annotated[
-    int | None, typer.Option("--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.")
+    int | None,
+    typer.Option(
+        "--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.", parser=whole_in(-1000000, 1000000, "Hz")
+    ),
 ]
 SensorsOption = Annotated[
-    str | None, typer.Option("--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.")
+    str | None,
+    typer.Option(
+        "--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.", autocompletion=complete.suites
+    ),
 ]
 FaultOption = Annotated[
     list[str] | None,
@@ -64,10 +94,18 @@ JsonOption = Annotated[
     str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
 ]
 WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
-WorkersOption = Annotated[int | None, typer.Option(min=1, help="Processes; as many as processors by default.")]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Processes; as many as processors by default.", parser=whole_in(1, MOST_WORKERS)),
+]
 FlightTimeoutOption = Annotated[
     float,
-    typer.Option("--flight-timeout", metavar="S", help="Longest a flight may take, by the clock on the wall."),
+    typer.Option(
+        "--flight-timeout",
+        metavar="S",
+        help="Longest a flight may take, by the clock on the wall.",
+        parser=number_in(0.001, 1e6, "s"),
+    ),
 ]
 LedgerOption = Annotated[
     Path | None,
@@ -77,7 +115,11 @@ FLIGHT_TIMEOUT_S = 600.0
 MarkdownOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")]
 CalibrationOption = Annotated[
     float | None,
-    typer.Option(metavar="S", help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]"),
+    typer.Option(
+        metavar="S",
+        help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]",
+        parser=number_in(0.0, 36000.0, "s"),
+    ),
 ]
 ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")]
 ReferenceOption = Annotated[
@@ -85,17 +127,27 @@ ReferenceOption = Annotated[
 ]
 UnitOption = Annotated[
     int | None,
-    typer.Option("--imu", min=0, metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0."),
+    typer.Option(
+        "--imu", metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0.", parser=whole_in(0, 99)
+    ),
 ]
 SeveralOption = Annotated[
-    str | None, typer.Option("--estimators", metavar="A,B,C", help="What flies it; all there are by default.")
-]
+    str | None,
+    typer.Option(
+        "--estimators", metavar="A,B,C", help="What flies it; all there are by default.",
+        autocompletion=complete.estimators,
+    ),
+]  # fmt: skip
 ParameterOption = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
 ]
 LogEstimatorsOption = Annotated[
-    str, typer.Option("--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.")
-]
+    str,
+    typer.Option(
+        "--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.",
+        autocompletion=complete.estimators,
+    ),
+]  # fmt: skip
 
 
 WithholdOption = Annotated[
@@ -108,20 +160,13 @@ WithholdOption = Annotated[
 ]
 
 
-def time_limit(seconds: float) -> float:
-    """What ``--flight-timeout`` says; refused where it is no time to fly in."""
-    if not 0.0 < seconds <= 1e6:
-        raise refusal(f"--flight-timeout {seconds:g} s: must be above 0 and at most 1e+06 s")
-    return seconds
-
-
 def changes_of(assignments: list[str] | None) -> dict[str, Any]:
     """Overrides of ``--set name=value``."""
     changes = {}
     for text in assignments or []:
         name, equals, value = text.partition("=")
-        if not (name.strip() and equals):
-            raise refusal(f"--set {text!r}: write name=value, for instance gps.latency_s=0.5")
+        if not (name.strip() and equals and value.strip()):
+            raise refusal(f"--set {brief(text)}: write name=value, for instance gps.latency_s=0.5")
         changes[name.strip()] = value.strip()
     return changes
 
@@ -149,5 +194,8 @@ def air(
 
 
 def names_of(text: str | None) -> list[str]:
-    """Names of a list with commas."""
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
+    """Names of a list with commas; refused where one of them is empty."""
+    names = [name.strip() for name in text.split(",")] if text is not None else []
+    if not all(names):
+        raise refusal(f"{brief(text)}: an empty name; write names with commas between them")
+    return names

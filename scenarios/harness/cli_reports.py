@@ -1,16 +1,16 @@
 """What every command does alike: refuse in one line what it cannot do, and write its reports, whole or not at all."""
 
-import json
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import IO, Any, TextIO
 
 import typer
 
 from scenarios.harness import guard
+from sim.wording import json_text
 
 
 @contextmanager
@@ -20,6 +20,8 @@ def usage() -> Iterator[None]:
         yield
     except ValueError as problem:
         raise refusal(str(problem)) from problem
+    except OSError as problem:  # a name that is too long, a folder that may not be looked into
+        raise refusal(f"{problem.filename or 'cannot read or write'}: {problem.strerror or problem}") from problem
 
 
 def refusal(message: str) -> typer.TyperException:
@@ -31,13 +33,15 @@ def refusal(message: str) -> typer.TyperException:
 def reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
     """Gives what writes the JSON.  Where that goes to standard output, everything else goes to standard error."""
     if target == "-":
+        if sys.stdout is None:
+            raise refusal("--json -: standard output is closed")
         with _aside() as stdout:
-            yield lambda data: _publish(_text(data) + "\n", stdout)
+            yield lambda data: _publish(data, stdout)
     else:
         path = Path(target) if target is not None else None
         with usage():
             check_file(path)
-        yield lambda data: write(path, lambda: _text(data) + "\n")
+        yield lambda data: write(path, lambda: json_text(data) + "\n")
 
 
 @contextmanager
@@ -68,13 +72,27 @@ def _aside() -> Iterator[TextIO]:
             os.dup2(kept, 1)
 
 
-def _publish(text: str, stdout: TextIO) -> None:
-    if not guard.publish(text):
-        stdout.write(text)
+def _publish(data: Any, stdout: TextIO) -> None:
+    if not guard.publish(json_text(data) + "\n"):
+        _print(data, stdout)
 
 
-def _text(data: Any) -> str:
-    return json.dumps(data, indent=2, allow_nan=False)
+def _print(data: Any, stdout: TextIO) -> None:
+    try:
+        print(json_text(data), file=stdout, flush=True)
+    except BrokenPipeError:  # whoever read it has seen enough: what is still in the buffer goes nowhere, quietly
+        abandon(stdout)
+    except OSError as error:
+        abandon(stdout)
+        raise refusal(f"cannot write the JSON to standard output: {error.strerror}") from error
+
+
+def abandon(stream: IO[str]) -> None:
+    """Send what is still in the buffer of a stream that cannot be written to nowhere, quietly."""
+    with suppress(OSError, ValueError):  # it may be no file
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)
 
 
 def check_file(path: Path | None) -> None:
@@ -106,7 +124,10 @@ def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
     data = made.encode("utf-8") if isinstance(made, str) else made
     target = path.resolve()  # what a link points to is replaced, not the link
     if _is_stream(target):
-        target.write_bytes(data)
+        try:
+            target.write_bytes(data)
+        except OSError as error:
+            raise refusal(f"cannot write to {path}: {error.strerror}") from error
         return
     with usage(), replacing(target) as temporary:
         temporary.write_bytes(data)

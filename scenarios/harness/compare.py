@@ -40,6 +40,7 @@ from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, judge
 from scenarios.harness.workers import fly_each
 from sim.log import Outcome
+from sim.wording import markdown, printable
 
 FLIGHT_CODE_FAILED = {Outcome.ESTIMATOR_FAILED, Outcome.TIMED_OUT, Outcome.WORKER_DIED}
 LETTERS = {"gyro": "G", "accelerometer": "A", "gps": "P", "magnetometer": "M", "airspeed": "V"}
@@ -201,12 +202,13 @@ class Comparison:
             "estimator", "given", "survived", "inclination RMS, deg", "p95", "max", "heading RMS, deg", "against",
             "update(), ns", "replay, ns", "checks passed",
         )  # fmt: skip
-        lines = [f"# {title(self)}", "", f"| {' | '.join(headings)} |", "|-|-|" + "-:|" * 5 + "-|-:|-:|-:|"]
+        lines = [f"# {markdown(title(self))}", "", f"| {' | '.join(headings)} |", "|-|-|" + "-:|" * 5 + "-|-:|-:|-:|"]
         for e in self.entrants:
             n = e.numbers
             costs = (e.cost.update_ns, e.cost.replay_ns) if e.cost else (None, None)
             cells = [
-                e.name, ", ".join(e.given), f"{e.survived} of {len(e.flights)}", *map(console.number, n.values()),
+                markdown(e.name), ", ".join(e.given), f"{e.survived} of {len(e.flights)}",
+                *map(console.number, n.values()),
                 e.heading_reference, *("" if c is None else f"{c:.0f}" for c in costs), checks_text(e),
             ]  # fmt: skip
             lines.append(f"| {' | '.join(cells)} |")
@@ -423,16 +425,15 @@ def tell(comparison: Comparison) -> None:
         )
     )
     for line in comparison.notes:
-        out.print(Text(f"note        {line}"), soft_wrap=True)
+        console.line(f"note        {line}")
     console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
         for flown in entrant.flights:
             v = flown.verdict
             if v.outcome != Outcome.COMPLETED:
-                at = f" at {v.metrics['flown_s'] or 0.0:.1f} s" if v.metrics else ""
-                why = f"{v.outcome.replace('_', ' ')}{at}"
-                text = f"{entrant.name}, seed {v.seed}: {why}" + (f": {v.message}" if v.message else "")
-                out.print(Text(text, "red"), soft_wrap=True)
+                at = f" at {v.metrics.get('flown_s') or 0.0:.1f} s" if v.rows else ""
+                why = f"{v.outcome.replace('_', ' ')}{at}" + (f": {v.message}" if v.message else "")
+                console.line(f"{entrant.name}, seed {v.seed}: {why}", "red")
 
 
 def _row(e: Entrant) -> list[str]:
@@ -442,4 +443,4 @@ def _row(e: Entrant) -> list[str]:
     heading = f"{n['heading_rms_deg']:.1f} {e.heading_reference[0]}"
     letters = "".join(LETTERS[name] for name in e.given)
     spent = "" if e.cost is None else f"{e.cost.ns / 1000.0:.2f}{'' if e.cost.replay_ns else '*'}"
-    return [e.name, letters, inclination, heading, spent, f"{e.survived}/{len(e.flights)} {checks_text(e)}"]
+    return [printable(e.name), letters, inclination, heading, spent, f"{e.survived}/{len(e.flights)} {checks_text(e)}"]

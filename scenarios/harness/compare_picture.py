@@ -18,6 +18,7 @@ from estimator.interface import Array
 from scenarios.harness.compare import LETTERS, Comparison, Entrant, checks_text
 from scenarios.harness.handbook_picture import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
 from scenarios.harness.metrics import Series, p95, rms
+from sim.wording import plotted
 
 COLOURS = (
     BLUE, ORANGE, GREEN, VIOLET, RED, TEAL, "#8c6d31", "#d6479a", "#5b6f8f", "#9aa61f", "#17a0c4", "#a0522d",
@@ -58,13 +59,15 @@ def draw(comparison: Comparison, path: Path) -> None:
 
 def _heading(figure: Any, comparison: Comparison, height: float) -> None:
     config, n = comparison.config, len(comparison.seeds)
-    figure.text(0.055, 1.0 - 0.55 / height, comparison.scenario.name.replace("_", " "), fontsize=25, fontweight="bold")
+    figure.text(
+        0.055, 1.0 - 0.55 / height, plotted(comparison.scenario.name.replace("_", " ")), fontsize=25, fontweight="bold"
+    )
     wind = f"wind {config.air.wind_m_s:g} m/s, turbulence W20 {config.air.turbulence_w20_m_s:g} m/s"
     facts = (
-        comparison.scenario.told_as,
+        plotted(comparison.scenario.told_as, 120),
         f"{n} {'seed' if n == 1 else 'seeds'}, the same for each",
-        config.aircraft.replace("_", " "),
-        f"sensors {Path(config.suite).stem}",
+        plotted(config.aircraft.replace("_", " ")),
+        f"sensors {plotted(Path(config.suite).stem)}",
         wind,
     )
     figure.text(0.055, 1.0 - 0.86 / height, "     ".join(facts), fontsize=10.5, color=FAINT)
@@ -160,7 +163,7 @@ def _names(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> Non
     ax.spines["bottom"].set_visible(False)
     for i, e in enumerate(entrants):
         ax.plot([0.005, 0.04], [i, i], color=colours[e.name], lw=4, solid_capstyle="butt")
-        name = e.name.rpartition(":")[2]
+        name = plotted(e.name.rpartition(":")[2], 40)
         ax.text(0.055, i, name, va="center", fontweight="bold", fontsize=9.0 if len(name) < 22 else 7.6)
         for j, (instrument, letter) in enumerate(LETTERS.items()):
             has = instrument in e.given

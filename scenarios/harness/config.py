@@ -12,15 +12,24 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from estimator.instruments import PROPERTIES, property_names, property_value
+from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.air_config import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.air_config import parse_wind, resolve_air
 from scenarios.harness.fault_config import require_faults_possible, typed_faults
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.validation import validated
 from sim.clock import Rates
-from sim.params import dotted_fields, near_misses, require_fitted
+from sim.log import FLOWN_DTYPE, TRUTH_DTYPE
+from sim.numbers import RIGHT, is_odd, number
+from sim.params import dotted_fields, near_misses, require_fitted, shown
 from sim.rng import stream
 from sim.sensors.fitting import own_files
+from sim.wording import brief
+
+MOST_BYTES = 2_000_000_000  # of a flight's log, which is held in memory
+ROW_BYTES = sum(dtype.itemsize for dtype in (TRUTH_DTYPE, MEASURED_DTYPE, FLOWN_DTYPE))
+SMALLEST, LARGEST = 1e-12, 1e9  # of a number that is no zero, in whatever unit
+LARGEST_SEED = 2**32 - 1
 
 Chance = Literal["random"]
 Triple = tuple[float, float, float]
@@ -160,8 +169,8 @@ class FlightConfig(_Model):
     manoeuvre: dict[str, float] = Field(default_factory=dict)
     box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
     box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
-    seed: int = Field(default=0, ge=0)
-    flight: int = Field(default=0, ge=0)
+    seed: int = Field(default=0, ge=0, le=LARGEST_SEED)
+    flight: int = Field(default=0, ge=0, le=LARGEST_SEED)
 
     @field_validator("faults", mode="before")
     @classmethod
@@ -182,6 +191,19 @@ class FlightConfig(_Model):
     def _calm_indoors(self) -> "FlightConfig":
         if isinstance(self.start, BenchStart) and not self.air.calm:
             raise ValueError("air: it rests on a table indoors, where no air moves; leave wind, gusts and the rest out")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_in_memory(self) -> "FlightConfig":
+        tick_s = 1.0 / self.rates.imu_hz
+        if self.duration_s < tick_s:
+            raise ValueError(f"duration_s = {self.duration_s!r} s: must be at least {tick_s:g} s, one tick of the loop")
+        most_s = MOST_BYTES / (ROW_BYTES * self.rates.imu_hz) - self.held_s
+        if self.duration_s > most_s:
+            raise ValueError(
+                f"duration_s = {self.duration_s:g} s: must be at most {max(most_s, 0.0):.0f} s at {self.rates.imu_hz} "
+                f"Hz, for the log is held in memory and may take {MOST_BYTES / 1e9:g} GB"
+            )
         return self
 
     @property
@@ -227,7 +249,9 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
             wind = parse_wind(str(value))
             data["air"] |= {"wind_m_s": wind.m_s, "wind_from_deg": wind.from_deg}
         else:
-            _put(data, _full_name(name, config), value)
+            full_name = _full_name(name, config)
+            _refuse_odd(full_name, value)
+            _put(data, full_name, value)
     changed = validated(FlightConfig, data)
     # Refuses a suite, a value or a fault that cannot be.
     fitted = suite_params(changed.suite, changed.sensors, changed.files)
@@ -235,6 +259,9 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed
+
+
+_TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts")
 
 
 def _full_name(name: str, config: FlightConfig) -> str:
@@ -250,7 +277,7 @@ def _full_name(name: str, config: FlightConfig) -> str:
     known = [*_dotted(config), *properties, *(f"sensors.{f}" for f in fields), "wind"]
     if name not in known and not open_ended:
         require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
-        raise ValueError(f"unknown parameter {name!r}: {near_misses(name, [*known, *fields])}")
+        raise ValueError(f"unknown parameter {brief(name)}: {near_misses(name, [*known, *fields])}")
     return name
 
 
@@ -267,13 +294,22 @@ def _dotted(config: FlightConfig) -> list[str]:
     return names
 
 
+def _refuse_odd(name: str, value: Any) -> None:
+    """Refuse text that only Python takes for a number, but where a text is meant: ValueError."""
+    if isinstance(value, str) and name not in _TEXTS and is_odd(value):
+        raise ValueError(f"{shown(name, value)}: {RIGHT}")
+
+
 def _put(data: dict[str, Any], name: str, value: Any) -> None:
     """Set the field of dotted `name`; what follows ``sensors.`` is one key."""
     head, _, rest = name.partition(".")
     if not rest:
         data[head] = value
     elif head in ("estimator_params", "sensors"):
-        data[head] = {**data[head], rest: literal(value)}
+        read = literal(value)
+        if not _is_sane(read):
+            raise ValueError(f"{shown(name, value)}: must be 0, or between {SMALLEST:g} and {LARGEST:g} in size")
+        data[head] = {**data[head], rest: read}
     else:
         data[head] = {**data[head], rest: value}
 
@@ -282,12 +318,19 @@ def literal(value: Any) -> Any:
     """Number, truth value or list that `value` spells, else the text itself."""
     if not isinstance(value, str):
         return value
-    for read in (json.loads, float):  # .5 is a number, but no JSON
+    for read in (json.loads, number):  # .5 is a number, but no JSON
         try:
             return read(value)
-        except ValueError:
+        except (ValueError, RecursionError):
             continue
     return value
+
+
+def _is_sane(value: Any) -> bool:
+    """Whether all numbers in it are of a size that some quantity could have: NaN and infinity are not."""
+    if isinstance(value, list | tuple):
+        return all(map(_is_sane, value))
+    return not isinstance(value, int | float) or value == 0 or SMALLEST <= abs(value) <= LARGEST
 
 
 def resolve(config: FlightConfig) -> FlightConfig:

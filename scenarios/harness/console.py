@@ -4,7 +4,9 @@ Everything goes to standard output, or to standard error while standard output c
 terminal, or where FORCE_COLOR is set, and never where NO_COLOR is.  Tables fit 80 columns.
 """
 
+import io
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,46 +14,91 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
 from estimator import compiling
-from sim.wording import printable
+from sim.wording import escaped, printable
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.progress import Progress
-    from rich.table import Table
     from rich.text import Text
 
     from estimator.instruments import Known
     from scenarios.harness.checks import Row
     from scenarios.harness.config import FlightConfig
+    from scenarios.harness.terminal import Grid, Terminal
 
 USAGE, INTERRUPTED = 2, 130  # exit codes, beside those of a verdict
 WIDTH = 80
 COMPILING = "compiling the kernels, once for this version: about half a minute"
 _bars: list["Progress"] = []  # on the screen now: what is written while one is there goes through its console
+_LONGEST = 2000  # characters of a line on standard error
 
 
-def err() -> "Console":
+class _Wishes:
+    """What the person wants of all that is printed."""
+
+    quiet = False
+
+
+def be_quiet(quiet: bool = True) -> None:
+    """Print nothing from now on but errors, and what `last` prints."""
+    _Wishes.quiet = quiet
+
+
+def be_tolerant() -> None:
+    """Let no character be fatal to the standard streams: one that their encoding lacks is written as its escape."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def err() -> "Terminal":
     """Standard error."""
     return _console(stderr=True)
 
 
-def out() -> "Console":
+def out() -> "Terminal":
     """Standard output."""
     return _console(stderr=False)
 
 
-def _console(stderr: bool) -> "Console":
-    from rich.console import Console
+def _console(stderr: bool, quiet: bool | None = None) -> "Terminal":
+    from scenarios.harness.terminal import LEAST, Terminal
 
-    console = Console(stderr=stderr, highlight=False, emoji=False)
-    if not console.is_terminal:
-        console.width = max(console.width, WIDTH)
+    console = Terminal(stderr=stderr, quiet=_Wishes.quiet if quiet is None else quiet)
+    # Where nobody has said how wide it is, a file or a pipe takes what a table needs.
+    unknown = not console.is_terminal and not os.environ.get("COLUMNS", "").isdigit()
+    console.width = max(console.width, WIDTH if unknown else LEAST)
     return console
+
+
+def line(text: str, style: str = "") -> None:
+    """A line of standard output, whatever the text holds; the terminal breaks it where it is too long."""
+    from rich.text import Text
+
+    out().print(Text(escaped(text), style), soft_wrap=True)
+
+
+def titled(name: str, about: str) -> "Text":
+    """The first line of a page: a name, and what follows it."""
+    from rich.text import Text
+
+    return Text(printable(name), "bold").append(escaped(about), "not bold")
+
+
+def last(text: str) -> None:
+    """The line that says how it went: printed even where all else is quiet."""
+    _console(stderr=False, quiet=False).print(escaped(text), soft_wrap=True)
+
+
+def outcome(text: str) -> None:
+    """The line that stands for the whole of a page, where that is not printed."""
+    if _Wishes.quiet:
+        last(text)
 
 
 def error(message: str) -> None:
     """One line on standard error, never wrapped: ``wingslevel: message``."""
-    sys.stderr.write(f"wingslevel: {' '.join(message.split())}\n")
+    if sys.stderr is not None:  # closed by whoever started us: there is nobody to tell
+        sys.stderr.write(f"wingslevel: {printable(message, _LONGEST)}\n")
 
 
 def note(line: str) -> None:
@@ -133,10 +180,10 @@ def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
 
 
 def number(value: float) -> str:
-    """`value` for a column of numbers: two decimals, so that the points line up; tiny ones as powers of ten."""
+    """`value` for a column of numbers: two decimals, so that the points line up; else powers of ten."""
     if not math.isfinite(value):
         return "none"
-    return f"{value:.1e}" if 0.0 < abs(value) < 0.005 else f"{value:.2f}"
+    return f"{value:.2f}" if value == 0.0 or 0.005 <= abs(value) < 1e7 else f"{value:.1e}"
 
 
 def figures(value: float) -> str:
@@ -151,41 +198,42 @@ def figures(value: float) -> str:
     return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
 
 
-def verdict_table(title: str, rows: Sequence["Row"], written: Callable[[float], str] = number) -> "Table":
+def verdict_table(title: str, rows: Sequence["Row"], written: Callable[[float], str] = number) -> "Grid":
     """The verdict on one flight, or on several pooled: check, measured, limit, unit, pass."""
     from rich.text import Text
 
-    grid = _table(title, "check")
-    for heading, justify in (("measured", "right"), ("limit", "right"), ("unit", "left"), ("", "left")):
-        grid.add_column(heading, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    grid = _grid(title)
+    grid.column("check", wraps=True)
+    for heading, right in (("measured", True), ("limit", True), ("unit", False), ("", False)):
+        grid.column(heading, right=right)
     for row in rows:
         word = Text("pass", "green") if row.passed else Text("FAIL", "bold red")
-        name = Text(f"{row.name} ({row.note})" if row.note else row.name)
-        grid.add_row(name, written(row.measured), f"{row.sense} {written(row.limit)}", Text(row.unit), word)
+        name = printable(f"{row.name} ({row.note})" if row.note else row.name)
+        grid.row([name, written(row.measured), f"{row.sense} {written(row.limit)}", printable(row.unit), word])
     return grid
 
 
-def claim_table(title: str, lines: Sequence[tuple[str, "Text", str]]) -> "Table":
+def claim_table(title: str, lines: Sequence[tuple[str, "Text", str]]) -> "Grid":
     """Claims of a paper: name, verdict, and the line that decides it."""
-    grid = _table(title)
+    grid = _grid(title)
     grid.show_header = False
     for wraps in (False, False, True):
-        grid.add_column(no_wrap=not wraps)
-    for name, verdict, decides in lines:
-        grid.add_row(name, verdict, decides)
+        grid.column("", wraps=wraps)
+    for cells in lines:
+        grid.row(cells)
     return grid
 
 
-def name_table(title: str, lines: Mapping[str, str]) -> "Table":
+def name_table(title: str, lines: Mapping[str, str]) -> "Grid":
     """Names with a line about each."""
     from rich.text import Text
 
-    grid = _table(title)
+    grid = _grid(title)
     grid.show_header = False
-    grid.add_column(no_wrap=True)
-    grid.add_column()
+    grid.column("")
+    grid.column("", wraps=True)
     for name, about in lines.items():
-        grid.add_row(Text(name), Text(about, "dim"))
+        grid.row([printable(name), Text(printable(about), "dim")])
     return grid
 
 
@@ -206,11 +254,12 @@ def print_known(known: Mapping[str, Mapping[str, "Known"]]) -> None:
             else:
                 lines.setdefault(f"{name} {_value(entry)} ({entry.source})", []).append(estimator)
     lines = {f"{what}:": list(dict.fromkeys(lines[what])) for what in sorted(lines)}
-    indent = 12 * " "
+    indent, width = 12 * " ", max(min(out().width, WIDTH) - 12, 20)
     for i, (what, texts) in enumerate(lines.items()):
         wrapped = textwrap.wrap(
-            f"{what} {', '.join(texts)}", WIDTH - 12, subsequent_indent="  ", break_on_hyphens=False
-        )
+            printable(f"{what} {', '.join(texts)}", _LONGEST), width, subsequent_indent="  ",
+            break_on_hyphens=False, break_long_words=False,
+        )  # fmt: skip
         for j, text in enumerate(wrapped):
             out().print(("known       " if i == j == 0 else indent) + text, style="dim", soft_wrap=True)
 
@@ -222,12 +271,13 @@ def _value(entry: "Known") -> str:
     return f"{entry.value:.4g}" if isinstance(entry.value, int | float) else str(entry.value)
 
 
-def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Table":
+def figure_table(title: str, figures: Mapping[str, float], unit: str) -> "Grid":
     """Names with a number each, all in one unit."""
-    grid = _table(title, "")
-    grid.add_column(unit, justify="right", no_wrap=True)
+    grid = _grid(title)
+    grid.column("", wraps=True)
+    grid.column(unit, right=True)
     for name, value in figures.items():
-        grid.add_row(name, number(value))
+        grid.row([name, number(value)])
     return grid
 
 
@@ -237,29 +287,24 @@ def table(
     rows: Sequence[Sequence[str]],
     text: Sequence[int] = (0,),
     wrapping: Sequence[int] = (),
-) -> "Table":
+) -> "Grid":
     """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty.
 
     Columns of `wrapping` give way where the table is too wide.
     """
-    grid = _table(title)
+    grid = _grid(title)
     grid.show_header = any(headings)
     for i, heading in enumerate(headings):
-        grid.add_column(heading, justify="left" if i in text else "right", no_wrap=i not in wrapping)
+        grid.column(heading, right=i not in text, wraps=i in wrapping)
     for row in rows:
-        grid.add_row(*row)
+        grid.row(row)
     return grid
 
 
-def _table(title: str, *wrapping: str) -> "Table":
-    """A plain table; of its columns only the `wrapping` ones give way where it is narrow, never a number."""
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
+def _grid(title: str) -> "Grid":
+    from scenarios.harness.terminal import Grid
 
-    grid = Table(*wrapping, box=box.SIMPLE_HEAD, title=Text(title, "bold"), title_justify="left", pad_edge=False)
-    grid.title_style = ""
-    return grid
+    return Grid(title)
 
 
 class Advance(Protocol):
@@ -272,7 +317,7 @@ class Advance(Protocol):
 def progress(what: str, unit: str) -> Iterator[Advance]:
     """A bar on standard error while the block runs; nothing where that is no terminal."""
     console = err()
-    if not console.is_terminal:
+    if _Wishes.quiet or not console.is_terminal:
         yield lambda done, total: None  # noqa: ARG005 - the signature of Advance
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

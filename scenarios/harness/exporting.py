@@ -124,15 +124,13 @@ def accuracy_of(flight: Flight) -> Accuracy:
 
 def tell(export: Export) -> None:
     """Print the table."""
-    from rich.markup import escape
-
     first_t_s, last_t_s = _span(export.fixes)
     times = ["none" if t is None else f"{export.utc(t):%H:%M:%S.%f}"[:-3] for t in (first_t_s, last_t_s)]
     rows = []
     for name, (path, data) in export.files.items():
         of_fixes = name in ("NMEA", "UBX")
         held = str(len(export.fixes)) if of_fixes else str(export.rows) if name == "CSV" else ""
-        rows.append((name, held, *(times if of_fixes else ("", "")), str(len(data)), escape(str(path))))
+        rows.append((name, held, *(times if of_fixes else ("", "")), str(len(data)), str(path)))
     headings = ("", "fixes, rows", "first, UTC", "last, UTC", "bytes", "file")
     title = f"GPS fixes of {export.utc(first_t_s or 0.0):%Y-%m-%d}" if "CSV" not in export.files else "exported"
     console.out().print(console.table(title, headings, rows, text=(0, 5)))

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from scenarios.harness.plugins import near_misses
+from sim.numbers import number
 from sim.sensors.faults import CHANNELS, Fault, kinds_of, require_possible
 
-_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)"
+_NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
 _FAULT = re.compile(rf"([^:=@]+):([^:=@]+)(?:=([^:=@]*))?@({_NUMBER})s?(-(?:({_NUMBER})s?)?)?")
 _RIGHT = "write channel:kind@from-to or channel:kind=value@from, for instance gyro.x:stuck@20-25 or gps:jump=50@10"
 _SHORT = {"accel": "accelerometer", "mag": "magnetometer", "baro": "barometer"}
@@ -36,7 +37,7 @@ def parse_fault(text: str) -> Fault:
         hint = near_misses(kind, kinds_of(channel))
         raise ValueError(f"fault = {text!r}: {channel} has no fault {kind!r}; {hint}")
     try:
-        values = tuple(float(value) for value in found[3].split(",")) if found[3] is not None else ()
+        values = tuple(number(value) for value in found[3].split(",")) if found[3] is not None else ()
     except ValueError:
         raise ValueError(f"fault = {text!r}: {found[3]!r} is no number; {_RIGHT}") from None
     from_s, to_s = float(found[4]), float(found[6]) if found[6] else math.inf

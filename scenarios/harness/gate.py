@@ -10,9 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rich.text import Text
-
 from scenarios.harness import console
+from scenarios.harness.config import LARGEST_SEED
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.ledger import Ledger
 from scenarios.harness.preflight import prepared
@@ -23,7 +22,7 @@ from scenarios.harness.workers import fly_each
 from sim import recording
 from sim.log import Outcome
 
-LARGEST_SEED = 2**32 - 1
+MOST_SEEDS, MOST_FLIGHTS = 10_000, 100_000  # of one command
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +71,10 @@ def tasks(
         wanted = [name for name in wanted if name not in left_out]
         if not wanted:
             raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
+    if len(wanted) * len(seeds) > MOST_FLIGHTS:
+        raise ValueError(
+            f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
+        )
     found = []
     for name in wanted:
         scenario, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
@@ -96,10 +99,10 @@ def tell(verdict: Verdict) -> None:
                 for row in flight.rows
                 if not row.passed
             )
-            why = f"{flight.outcome.replace('_', ' ')}: {flight.message}" if flight.message else failed
-            out.print(Text(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red"), soft_wrap=True)
+            why = flight.ending if flight.message or flight.broken else failed
+            console.line(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red")
     flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))
-    out.print(f"passed: {flights} flights, {pooled} scenarios pooled")
+    console.last(f"passed: {flights} flights, {pooled} scenarios pooled")
 
 
 def parse_seeds(text: str) -> list[int]:
@@ -112,14 +115,14 @@ def parse_seeds(text: str) -> list[int]:
     right = "write numbers and ranges, for instance 0-9 or 0,2,5-7"
     seeds: dict[int, None] = {}
     for part in text.split(","):
-        found = re.fullmatch(r"\s*(\d+)(?:-(\d+))?\s*", part)
+        found = re.fullmatch(r" *([0-9]{1,20})(?:-([0-9]{1,20}))? *", part)
         if not found:
             raise ValueError(f"seeds = {text!r}: {right}")
         first, last = int(found[1]), int(found[2] or found[1])
         if not first <= last <= LARGEST_SEED:
             raise ValueError(f"seeds = {text!r}: {part.strip()} is no range of seeds from 0 to {LARGEST_SEED}; {right}")
-        if last - first >= 1_000_000:
-            raise ValueError(f"seeds = {text!r}: {last - first + 1} flights at once are too many; split them")
+        if last - first + len(seeds) >= MOST_SEEDS:
+            raise ValueError(f"seeds = {text!r}: more than {MOST_SEEDS} at once are too many; split them")
         seeds |= dict.fromkeys(range(first, last + 1))
     return list(seeds)
 

@@ -158,7 +158,8 @@ def tell(book: Handbook) -> None:
     """Print the page."""
     out, f = console.out(), book.frame
     loading = f"{10.0 * f.mass_kg / f.area_m2:.1f} g/dm2"
-    out.print(f"[bold]{book.name}[/]  {f.mass_kg:.3f} kg, {f.area_m2:.3f} m2, span {f.span_m:.2f} m, {loading}")
+    frame = f"  {f.mass_kg:.3f} kg, {f.area_m2:.3f} m2, span {f.span_m:.2f} m, {loading}"
+    out.print(console.titled(book.name, frame))
     out.print(f"Still air, {book.performance.height_m:g} m; modes at the cruise.", style="dim")
     for grid in (_figures(book), _polar(book), _turns(book), _modes(book), _derivatives(book)):
         out.print(grid)

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.text import Text
 
 from estimator.instruments import Instruments, property_names, to_json
 from scenarios.harness import console, logs, viewing
@@ -127,32 +126,32 @@ def tell(told: Told) -> None:
     """The log, what was repaired in it, the table, and where the recordings are."""
     out, log = console.out(), told.log
     length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
-    out.print(Text(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}"), soft_wrap=True)
+    console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}")
     for line in log.notes:
-        out.print(Text(f"note        {line}"), soft_wrap=True)
+        console.line(f"note        {line}")
     for line in log.repairs:
-        out.print(Text(f"repaired    {line}", "yellow"), soft_wrap=True)
+        console.line(f"repaired    {line}", "yellow")
     for line in told.notes:
-        out.print(Text(f"note        {line}"), soft_wrap=True)
+        console.line(f"note        {line}")
     if len(log.ledger):
         columns = ("", "read", "used", "left out")
         out.print(console.table("samples in the log", columns, _books(log), text=(0, 3), wrapping=(3,)))
     if log.reference is not None:
-        out.print(Text(f"against     {log.reference.name}, {told.judged_s:.1f} s of it judged"), soft_wrap=True)
+        console.line(f"against     {log.reference.name}, {told.judged_s:.1f} s of it judged")
     rows = [_row(replayed) for replayed in told.replays]
-    out.print(console.table("differences from the reference, degrees", _HEADINGS, rows))
+    out.print(console.table("differences from the reference, degrees", _HEADINGS, rows, wrapping=(0,)))
     console.print_known({replayed.estimator: replayed.known for replayed in told.replays})
     for replayed in told.replays:
         if replayed.refused:
             refused = ", ".join(f"{n} {name}" for name, n in replayed.refused.items())
-            out.print(Text(f"not believed by {replayed.estimator}: {refused} samples"), soft_wrap=True)
+            console.line(f"not believed by {replayed.estimator}: {refused} samples")
         if replayed.failure:
-            out.print(Text(f"{replayed.estimator} failed: {replayed.failure}", "bold red"), soft_wrap=True)
+            console.line(f"{replayed.estimator} failed: {replayed.failure}", "bold red")
     if told.not_judged:
         style = "bold red" if log.reference is not None else "yellow"
-        out.print(Text(f"nothing judged: {told.not_judged}", style), soft_wrap=True)
+        console.line(f"nothing judged: {told.not_judged}", style)
     for folder in told.folders.values():
-        out.print(Text(f"recording   {folder}"), soft_wrap=True)
+        console.line(f"recording   {folder}")
 
 
 def _books(log: RecordedLog) -> list[list[str]]:

@@ -236,9 +236,9 @@ def check_picture(path: Any) -> None:
 def tell(page: Page) -> None:
     """Print the page."""
     out, about = console.out(), page.subject
-    out.print(f"[bold]{about.name}[/]  {about.about}")
+    out.print(console.titled(about.name, f"  {about.about}"))
     if about.datasheet:
-        out.print(about.datasheet, style="dim")
+        console.line(about.datasheet, "dim")
     if about.members:
         rows = [[_title(kind), part] for kind, part in about.members.items()]
         out.print(console.table("Members", ("", ""), rows, text=(0, 1)))

@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from rich.text import Text
-
 from estimator.instruments import to_json
 from scenarios.harness import console, guard, viewing
 from scenarios.harness.config import FlightConfig
@@ -112,33 +110,25 @@ def _warn_if_late(flight: Flight) -> None:
         )
 
 
-def _ended(judged: FlightVerdict) -> str:
-    words = judged.outcome.replace("_", " ")
-    return f"{words}: {judged.message}" if judged.message else words
-
-
 def tell(flown: Flown) -> None:
     """The verdict, how the flight ended, and where to see it."""
     out, flight, judged = console.out(), flown.flight, flown.judged
     if flight is None:
-        out.print(
-            Text(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}: {_ended(judged)}", "bold red"),
-            soft_wrap=True,
-        )
+        console.line(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}: {judged.ending}", "bold red")
         return
     out.print(console.verdict_table(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}", judged.rows))
     ended = (
         f"{flight.outcome.replace('_', ' ')} {len(flight.log) * flight.dt_s - flight.release_s:.1f} s after the release"
     )
     planned = flight.outcome == Outcome.COMPLETED
-    out.print(
-        Text(f"{ended}: {flight.message}" if flight.message else ended, "" if planned else "bold red"), soft_wrap=True
-    )
+    console.line(f"{ended}: {flight.message}" if flight.message else ended, "" if planned else "bold red")
     for event in flight.events:
         if event.level == "warn":
-            out.print(Text(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow"), soft_wrap=True)
+            console.line(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow")
     console.print_known({judged.estimator: judged.known})
-    out.print(Text(f"recording   {flown.folder}\nto see it   wingslevel view {flown.folder}"), soft_wrap=True)
+    console.line(f"recording   {flown.folder}")
+    console.line(f"to see it   wingslevel view {flown.folder}")
+    console.outcome(f"passed: {sum(row.passed for row in judged.rows)} of {len(judged.rows)} checks")
 
 
 def _free_folder(into: Path, scenario: str, config: FlightConfig) -> Path:

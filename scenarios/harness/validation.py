@@ -5,6 +5,8 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from sim.wording import brief, printable
+
 _M = TypeVar("_M", bound=BaseModel)
 
 
@@ -45,20 +47,21 @@ def _one_line(error: ValidationError) -> str:
     choices = "".join(f" or {e['ctx']['expected']}" for e in found if e["type"] == "literal_error" and e != first)
     if kind in _BOUNDS:
         key, words = _BOUNDS[kind]
-        return f"{shown}: must be {words} {first['ctx'][key]:g} {unit}".strip() + choices
+        bound = first["ctx"][key]
+        return f"{shown}: must be {words} {bound if isinstance(bound, int) else f'{bound:g}'} {unit}".strip() + choices
     if kind in _WHOLE or kind in ("float_parsing", "float_type"):
         return f"{shown}: must be a {'whole number' if kind in _WHOLE else 'number'}{choices}"
     if kind == "finite_number":
         return f"{shown}: must be a finite number"
     if kind == "extra_forbidden":
-        return f"unknown parameter {where!r}"
-    return f"{shown}: {first['msg'][0].lower()}{first['msg'][1:]}"
+        return f"unknown parameter {brief(where)}"
+    return f"{shown}: {printable(first['msg'][0].lower() + first['msg'][1:])}"
 
 
 def _shown(value: Any) -> str:
     """`value` as it was typed, in quotes where it is no number."""
     try:
         float(value)
-    except (TypeError, ValueError):
-        return repr(value)
-    return str(value)
+    except (TypeError, ValueError, OverflowError):
+        return brief(value)
+    return printable(str(value), 60)

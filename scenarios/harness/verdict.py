@@ -1,27 +1,32 @@
 """The verdict: every check of every flight, the same pooled over the flights, and the exit code."""
 
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
-from xml.etree import ElementTree
 
 from estimator.instruments import Known, to_json
 from scenarios.harness.checks import Row
 from scenarios.harness.metrics import summary
 from scenarios.harness.scenario import Scenario
 from sim.log import Flight, Outcome
+from sim.wording import json_text, markdown
 
 PASSED, FAILED, SIMULATION_FAILED = 0, 1, 3  # exit codes; 2 is for usage and configuration
+# Outcomes that are no result of flying: what was to be judged is not there, or only half of it.
+BROKEN = frozenset(
+    (Outcome.DIVERGED, Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.TIMED_OUT, Outcome.WORKER_DIED,
+     Outcome.INTERRUPTED)
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class FlightVerdict:
     """One flight judged: which it was, how it ended, its lines, and the numbers reported beside them.
 
+    rows : none where nothing of it was recorded: its process died, or was stopped
     known : what the estimator was given of the instruments, or has learnt, by name
-    wall_s : time that it took to fly and judge; of the machine and the moment, so no part of what is compared
+    wall_s : how long it took; None where nobody looked.  It is no part of the result
     """
 
     scenario: str
@@ -36,9 +41,20 @@ class FlightVerdict:
     wall_s: float | None = field(default=None, compare=False)
 
     @property
+    def broken(self) -> bool:
+        """Whether it ended in an error: flight code raised, the simulation blew up, it never came back."""
+        return self.outcome in BROKEN or not self.rows
+
+    @property
     def passed(self) -> bool:
-        """Whether every check passed; False where there was none."""
-        return bool(self.rows) and all(row.passed for row in self.rows)
+        """Whether every check passed; False where there was none, or where it ended in an error."""
+        return not self.broken and all(row.passed for row in self.rows)
+
+    @property
+    def ending(self) -> str:
+        """How it ended, in words, with the message where there is one."""
+        words = self.outcome.replace("_", " ")
+        return f"{words}: {self.message}" if self.message else words
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +112,8 @@ class Verdict:
         )
 
     @property
-    def _missing_text(self) -> str:
+    def missing_text(self) -> str:
+        """How many flights are missing, in words."""
         return f"{self.missing} of {len(self.flights) + self.missing} flights are missing"
 
     @property
@@ -130,55 +147,52 @@ class Verdict:
 
     def to_json_text(self) -> str:
         """The verdict as JSON text."""
-        return json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n"
+        return json_text(self.to_json()) + "\n"
+
+    def flights_of(self, pool: PooledVerdict) -> list[FlightVerdict]:
+        """The flights that were pooled."""
+        return [v for v in self.flights if (v.scenario, v.estimator) == (pool.scenario, pool.estimator)]
 
     def to_junit(self) -> str:
-        """The verdict as JUnit XML: a suite per scenario and estimator, a case per check of each flight and pooled."""
-        root = ElementTree.Element("testsuites", name="wingslevel")
-        for pool in self.pooled:
-            of_it = [v for v in self.flights if (v.scenario, v.estimator) == (pool.scenario, pool.estimator)]
-            cases = [(f"seed {v.seed} flight {v.flight}", row, v.message) for v in of_it for row in v.rows]
-            cases += [("pooled", row, "") for row in pool.rows]
-            suite = ElementTree.SubElement(
-                root, "testsuite", name=f"{pool.scenario}.{pool.estimator}", tests=str(len(cases)),
-                failures=str(sum(not row.passed for _, row, _ in cases)), errors="0",
-            )  # fmt: skip
-            for which, row, message in cases:
-                case = ElementTree.SubElement(
-                    suite, "testcase", classname=suite.get("name", ""), name=f"{row.name} [{which}]"
-                )
-                if not row.passed:
-                    text = "; ".join(
-                        part for part in (f"{measured_text(row)}, limit {limit_text(row)}", message) if part
-                    )
-                    ElementTree.SubElement(case, "failure", message=_printable(text))
-        if self.missing:
-            suite = ElementTree.SubElement(root, "testsuite", name="incomplete", tests="1", failures="0", errors="1")
-            case = ElementTree.SubElement(suite, "testcase", classname="incomplete", name="all flights are finished")
-            ElementTree.SubElement(case, "error", message=self._missing_text)
-        ElementTree.indent(root)
-        return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+        """The verdict as JUnit XML, see `junit`."""
+        from scenarios.harness.junit import junit
+
+        return junit(self)
 
     def to_markdown(self) -> str:
         """The verdict as Markdown: the pooled table of each scenario, then the flights that failed."""
         lines = [f"# Verdict: {'passed' if self.passed else 'FAILED'}", ""]
         if self.missing:
-            lines = ["# Verdict: INCOMPLETE", "", f"Interrupted: {self._missing_text}.", ""]
+            lines = ["# Verdict: INCOMPLETE", "", f"Interrupted: {self.missing_text}.", ""]
         for pool in self.pooled:
-            of_it = [v for v in self.flights if (v.scenario, v.estimator) == (pool.scenario, pool.estimator)]
-            lines += [f"## {pool.scenario}, {pool.estimator}, {_counted(pool.n_flights)}", "", *_table(pool.rows), ""]
-            for v in of_it:
+            title = f"{markdown(pool.scenario)}, {markdown(pool.estimator)}, {counted(pool.n_flights)}"
+            lines += [f"## {title}", "", *_table(pool.rows), ""]
+            for v in self.flights_of(pool):
                 if not v.passed:
-                    lines += [f"### seed {v.seed} flight {v.flight}: {v.message or v.outcome}", "", *_table(v.rows), ""]
+                    ended = f"{v.outcome}: {v.message}" if v.message else str(v.outcome)
+                    lines += [f"### seed {v.seed} flight {v.flight}: {markdown(ended)}", ""]
+                    lines += [*_table(v.rows), ""] if v.rows else []
         return "\n".join(lines)
 
 
 def _pool(scenario: Scenario, estimator: str, flights: Sequence[FlightVerdict]) -> PooledVerdict:
-    rows = (check.pool([v.rows[i] for v in flights if v.rows]) for i, check in enumerate(scenario.checks))
+    """Every check over the flights that have lines; where some have none it has not passed."""
+    judged = [v for v in flights if v.rows]
+    rows = [check.pool([v.rows[i] for v in judged]) for i, check in enumerate(scenario.checks)]
+    if missing := len(flights) - len(judged):
+        note = f"{missing} of {len(flights)} flights missing"
+        rows = [
+            replace(
+                row, passed=False, note="; ".join(filter(None, (note, row.note))),
+                limit=len(flights) if check.pooled == "count" else row.limit,
+            )
+            for check, row in zip(scenario.checks, rows, strict=True)
+        ]  # fmt: skip
     return PooledVerdict(scenario.name, estimator, len(flights), tuple(rows))
 
 
-def _counted(n: int) -> str:
+def counted(n: int) -> str:
+    """So many flights, in words."""
     return f"{n} flight" if n == 1 else f"{n} flights"
 
 
@@ -203,12 +217,8 @@ def limit_text(row: Row) -> str:
 
 def _table(rows: Sequence[Row]) -> list[str]:
     lines = ["| check | measured | limit | verdict |", "|-|-|-|-|"]
-    return lines + [
-        f"| {row.name} | {measured_text(row)} | {limit_text(row)} | {'pass' if row.passed else '**FAIL**'} |"
-        for row in rows
-    ]
-
-
-def _printable(text: str) -> str:
-    """`text` without the control characters that XML cannot hold."""
-    return "".join(c for c in text if c.isprintable())
+    for row in rows:
+        safe = replace(row, name=markdown(row.name), unit=markdown(row.unit), note=markdown(row.note))
+        word = "pass" if row.passed else "**FAIL**"
+        lines.append(f"| {safe.name} | {measured_text(safe)} | {limit_text(safe)} | {word} |")
+    return lines

@@ -82,8 +82,8 @@ def processors() -> int:
 def _results(tasks: Sequence[Flyable[_Result]], workers: int, limit_s: float | None) -> Iterator[tuple[int, _Result]]:
     """Number and result of each task, as they come."""
     waiting, lives = deque(range(len(tasks))), [LIVES] * len(tasks)
-    told = multiprocessing.get_context("spawn").Value("b", compiling.compiled() > 0)
-    crew: list[_Worker[_Result]] = [_Worker(limit_s, told) for _ in range(workers)]
+    announced = multiprocessing.get_context("spawn").Value("b", compiling.compiled() > 0)
+    crew: list[_Worker[_Result]] = [_Worker(limit_s, announced) for _ in range(workers)]
     try:
         while waiting or any(worker.busy for worker in crew):
             for worker in crew:

@@ -13,6 +13,7 @@ from sim.sensors.noise import Output, Source, require
 
 Triple = tuple[float, float, float]
 STILL: Triple = (0.0, 0.0, 0.0)
+LONGEST_REST_S = 600.0  # it is simulated, and held in memory
 MOST_SUPPLY_ERROR = 0.1  # five sigma of it and the largest sag leave a supply above zero
 MOST_SUPPLY_SAG = 0.4
 
@@ -56,6 +57,8 @@ class BoardParams:
                 raise ValueError(f"BoardParams.{name} = {value!r} {unit}: choose three finite numbers")
         require(self, "K", "warming_k")
         require(self, "s", "rest_s")
+        if self.rest_s > LONGEST_REST_S:
+            raise ValueError(f"BoardParams.rest_s = {self.rest_s:g} s: choose at most {LONGEST_REST_S:g} s")
         require(self, "s", "warming_s", least=0.001)
         require(self, "g", "vibration_g")
         require(self, "deg/s", "vibration_deg_s")

@@ -116,11 +116,13 @@ def test_junit_counts_what_it_holds_and_survives_any_message():
     root = ElementTree.fromstring(verdict.to_junit())
     (suite,) = root.findall("testsuite")
     cases = suite.findall("testcase")
-    assert suite.get("tests") == str(len(cases)) == "6"
-    failing = [case for case in cases if case.find("failure") is not None]
-    assert suite.get("failures") == str(len(failing)) == "4"  # seed 1 and pooled, both checks
-    assert len({(case.get("classname"), case.get("name")) for case in cases}) == 6
-    assert '<"bad"> & ' in failing[0].find("failure").get("message")
+    assert suite.get("tests") == str(len(cases)) == "5"  # two checks of seed 0, the error of seed 1, two pooled
+    counts = {kind: sum(case.find(kind) is not None for case in cases) for kind in ("failure", "error", "skipped")}
+    assert counts == {"failure": int(suite.get("failures")), "error": 1, "skipped": int(suite.get("skipped"))}
+    assert len({(case.get("classname"), case.get("name")) for case in cases}) == 5
+    (error,) = suite.findall("testcase/error")
+    assert error.get("type") == "estimator_failed"
+    assert '<"bad"> & \\x00\\x1b[0m' in error.get("message")
 
 
 def test_markdown_shows_failed_flights_with_their_numbers():
