@@ -187,7 +187,7 @@ def test_rotation_error_any_angle_is_the_geodesic(axis, angle):
     """Exact from a ten-millionth of a radian to half a turn, where an arc cosine of the trace is blind."""
     A = rotations(1)[0]
     B = Rotation.from_rotvec(np.array(axis) / np.linalg.norm(axis) * angle).as_matrix() @ A
-    # With s = sin(angle / 2) the code sums s^2 = |A - B|^2 / 8.  Each element of B is right to e = 4 eps (a quaternion's
+    # With s = sin(angle / 2) the code sums s^2 = |A - B|^2 / 8.  Each element of B is right to e = 4 eps (quaternion to
     # matrix, three products), which moves s^2 by sqrt(2)/2 |3 e| s, and the sum itself by 9/2 eps s^2: 3e-15 s in all.
     # The angle is 2 asin(s) and moves by that over s c, c the cosine; at half a turn, where c is 0, by 2 sqrt(3e-15) at
     # most.  The vector handed to SciPy is right to 4 eps of its length of pi: another 3e-15.
