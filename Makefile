@@ -23,6 +23,9 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable . --group dev
 	@touch $@
 
+fuzz: venv  ## search on where the tests draw examples: others each time, twenty times as many
+	HYPOTHESIS_PROFILE=explore $(BIN)/pytest -n $(WORKERS) -m hypothesis
+
 fly: venv  ## set up, and fly the hand launch
 	@$(BIN)/wingslevel fly hand_launch
 

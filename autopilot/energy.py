@@ -25,10 +25,11 @@ AIAA 83-2239.
 import math
 from dataclasses import dataclass
 
-from autopilot.guidance import gps_age, height, unit
+from autopilot.guidance import gps_age, height, is_wind, unit
 from autopilot.stabilise import G_M_S2, far_off
 from estimator.jit import kernel
 from estimator.kernels import clip
+from estimator.screening import AIRSPEED_RANGE_M_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,13 +102,14 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
     s : record with `airspeed_m_s`, `airspeed_known`, `air_left_s`, updated
     """
     e = p.energy
-    s.air_left_s = e.speed_trust_s if row.air_new and math.isfinite(row.airspeed_m_s) else s.air_left_s - dt_s
-    if s.air_left_s > 0.0:
+    measured = abs(row.airspeed_m_s) < AIRSPEED_RANGE_M_S  # NaN is not
+    s.air_left_s = e.speed_trust_s if row.air_new and measured else s.air_left_s - dt_s
+    if s.air_left_s > 0.0 and measured:
         now_m_s, s.airspeed_known = row.airspeed_m_s, 1
     else:
         now_m_s, s.airspeed_known = math.nan, 0
         lag_s = gps_age(row, p.guidance)
-        if math.isfinite(lag_s) and math.isfinite(wind_e_m_s[0] + wind_e_m_s[1] + wind_e_m_s[2]):
+        if math.isfinite(lag_s) and is_wind(wind_e_m_s, 3):
             v, w = row.gps_v_e_m_s, wind_e_m_s
             filtered_m_s = math.sqrt((v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2)
             turned = s.unseen_turn_rad * p.guidance.gps_filter_s / max(lag_s, 1e-3)
@@ -139,7 +141,7 @@ def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s): 
         if towards_north == 0.0 and towards_east == 0.0:
             towards_north, towards_east = north, east
         now_m_s = (s.airspeed_m_s - s.ground_m_s) * (towards_north * north + towards_east * east)
-        if math.isfinite(wind_e_m_s[0] + wind_e_m_s[1]):
+        if is_wind(wind_e_m_s, 2):
             now_m_s = -(towards_north * wind_e_m_s[0] + towards_east * wind_e_m_s[1])
     now_m_s = max(now_m_s, 0.0)
     filter_s = p.energy.headwind_found_s if now_m_s > s.headwind_m_s else p.energy.headwind_lost_s

@@ -35,11 +35,12 @@ import math
 from dataclasses import dataclass
 
 from autopilot.energy import hold_height
-from autopilot.guidance import gps_age
+from autopilot.guidance import gps_age, is_fix
 from autopilot.interface import Mode
 from estimator.interface import Health
 from estimator.jit import kernel
 from estimator.rotation import integrate
+from estimator.screening import GYRO_RANGE_RAD_S
 
 MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW = (int(m) for m in Mode)
 GOOD, POOR = int(Health.GOOD), int(Health.POOR)
@@ -80,9 +81,7 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
 
     row : measured   s : record with `silent_s`, `heard_s`, `circled_s`, updated   p : record of FailsafeParams
     """
-    arrived = row.gps_new != 0
-    for i in range(3):  # a fix of no numbers is none
-        arrived = arrived and math.isfinite(row.gps_p_e_m[i]) and math.isfinite(row.gps_v_e_m_s[i])
+    arrived = row.gps_new != 0 and is_fix(row)
     s.silent_s = 0.0 if arrived or row.gps_valid == 0 else s.silent_s + dt_s
     heard = s.heard_s >= p.gps_back_s
     patience_s = p.gps_lost_s if heard else 0.5 * p.gps_lost_s
@@ -127,9 +126,9 @@ def examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, row, s, p, g, dt_s):  #
 
 @kernel
 def carry_on(row, s, dt_s):  # type: ignore[no-untyped-def]
-    """Turn the attitude kept by one raw gyro sample less the offset kept (Eqns 16-21); no number turns nothing."""
-    gyro = row.gyro_b_rad_s
-    if math.isfinite(gyro[0] + gyro[1] + gyro[2]):
+    """Turn the attitude kept by one raw gyro sample less the offset kept (Eqns 16-21); no measurement turns nothing."""
+    gyro, most = row.gyro_b_rad_s, GYRO_RANGE_RAD_S
+    if abs(gyro[0]) <= most and abs(gyro[1]) <= most and abs(gyro[2]) <= most:
         for i in range(3):
             s.omega_kept_b_rad_s[i] = gyro[i] - s.bias_kept_b_rad_s[i]
         integrate(s.R_kept_eb, s.omega_kept_b_rad_s, dt_s)

@@ -15,6 +15,8 @@ from autopilot.stabilise import shorter_way
 from estimator.jit import kernel
 from estimator.kernels import clip
 
+MOST_M, MOST_M_S = 1e6, 1000.0  # no fix is further from the launch point, or faster
+MOST_WIND_M_S = 100.0  # and no wind is
 COURSE, RETURN = int(Mode.COURSE), int(Mode.RETURN)
 
 
@@ -46,15 +48,30 @@ class GuidanceParams:
 
 
 @kernel
+def is_fix(row):  # type: ignore[no-untyped-def]
+    """Whether position and velocity of `row` can be those of an aeroplane; NaN and infinity cannot."""
+    good = True
+    for i in range(3):
+        good = good and abs(row.gps_p_e_m[i]) <= MOST_M and abs(row.gps_v_e_m_s[i]) <= MOST_M_S
+    return good
+
+
+@kernel
+def is_wind(wind_e_m_s, components):  # type: ignore[no-untyped-def]
+    """Whether so many components of a wind can be those of one; NaN, where the estimator tells none, cannot."""
+    good = True
+    for i in range(components):
+        good = good and abs(wind_e_m_s[i]) <= MOST_WIND_M_S
+    return good
+
+
+@kernel
 def gps_age(row, p):  # type: ignore[no-untyped-def]
     """Age of the motion that the last fix describes, s; infinite where there is none to believe."""
     if row.gps_valid == 0:
         return math.inf
-    known = math.isfinite(row.gps_t_s)
-    for i in range(3):
-        known = known and math.isfinite(row.gps_p_e_m[i]) and math.isfinite(row.gps_v_e_m_s[i])
-    age_s = row.t_s - row.gps_t_s
-    return max(age_s, 0.0) + p.gps_filter_s if known and age_s < p.gps_patience_s else math.inf
+    age_s = row.t_s - row.gps_t_s  # NaN is no age
+    return max(age_s, 0.0) + p.gps_filter_s if is_fix(row) and age_s < p.gps_patience_s else math.inf
 
 
 @kernel
@@ -89,7 +106,7 @@ def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, p):  # type: ignore[n
     north, east = unit(R_eb[0, 0], R_eb[1, 0])
     if not on_nose:
         return north, east
-    if math.isfinite(wind_e_m_s[0]) and math.isfinite(wind_e_m_s[1]):
+    if is_wind(wind_e_m_s, 2):
         wind_m_s, most_m_s = math.hypot(wind_e_m_s[0], wind_e_m_s[1]), p.wind_share * s.airspeed_m_s
         part = most_m_s / wind_m_s if wind_m_s > most_m_s else 1.0
         return unit(s.airspeed_m_s * north + part * wind_e_m_s[0], s.airspeed_m_s * east + part * wind_e_m_s[1])

@@ -11,6 +11,7 @@ from autopilot.energy import hold_height, throttle_for
 from autopilot.guidance import height
 from autopilot.stabilise import G_M_S2
 from estimator.jit import kernel
+from estimator.screening import FORCE_RANGE_M_S2
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ def feel_throw(R_eb, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """
     if s.thrown_s >= 0.0:
         s.thrown_s += dt_s
-    elif math.isfinite(row.force_b_m_s2[0]):
+    elif abs(row.force_b_m_s2[0]) <= FORCE_RANGE_M_S2:  # beyond, and NaN, is no measurement and no throw
         # Specific force is acceleration minus gravity; gravity along the nose is g r_zx.
         along_nose = row.force_b_m_s2[0] + G_M_S2 * R_eb[2, 0]
         s.felt_m_s2 += (along_nose - s.felt_m_s2) * dt_s / (p.throw_mean_s + dt_s)

@@ -23,7 +23,7 @@ Source: S. Park, J. Deyst, J. P. How, A New Nonlinear Guidance Logic for Traject
 import math
 from dataclasses import dataclass
 
-from autopilot.guidance import gps_age, heading_error, unit
+from autopilot.guidance import gps_age, heading_error, is_wind, unit
 from autopilot.stabilise import G_M_S2, shorter_way
 from estimator.jit import kernel
 from estimator.kernels import clip
@@ -142,6 +142,8 @@ def bank_to_circle(north, east, r_zy, row, s, limit_rad, centre_north_m, centre_
 @kernel
 def speed_along(north, east, wind_e_m_s, airspeed_m_s):  # type: ignore[no-untyped-def]
     """Speed over the ground in a direction (north, east), m/s, by the wind triangle; NaN where no wind is known."""
+    if not is_wind(wind_e_m_s, 2):
+        return math.nan
     along_m_s = wind_e_m_s[0] * north + wind_e_m_s[1] * east
     across_m_s = wind_e_m_s[1] * north - wind_e_m_s[0] * east
     if not abs(across_m_s) < airspeed_m_s:

@@ -162,19 +162,28 @@ def turn(row, s, good):  # type: ignore[no-untyped-def]
     if s.stale_euler:
         _copy(s.R_eb, s.R_euler_eb)
     angle_rad = s.dt_s * np.sqrt(total[0] * total[0] + total[1] * total[1] + total[2] * total[2])
-    parts = 1 + int(min(angle_rad / LONGEST_STEP_RAD, 1000.0))
+    parts = 1
+    if angle_rad >= LONGEST_STEP_RAD:  # NaN is not: its one part finds the matrix lost
+        parts += int(min(angle_rad / LONGEST_STEP_RAD, 1000.0))
     for _ in range(parts):
         propagate(s.R_eb, total, s.dt_s / parts)
         if not renormalise_exactly(s.R_eb):
-            _copy(s.R_euler_eb, s.R_eb)
-            if not renormalise_exactly(s.R_eb):
-                level(s.R_eb)
-            s.omega_yaw_p = s.sum_s = 0.0
-            for i in range(3):
-                s.omega_p_b[i] = s.omega_i_b[i] = s.omega_sum_b[i] = 0.0
+            _begin_anew(s)
             break
     if not s.stale_euler:
         _copy(s.R_eb, s.R_euler_eb)
+
+
+@kernel
+def _begin_anew(s):  # type: ignore[no-untyped-def]
+    """Go back to the attitude of the sample before, or level, and forget all corrections: one of them spoilt it."""
+    _copy(s.R_euler_eb, s.R_eb)
+    if not renormalise_exactly(s.R_eb):
+        level(s.R_eb)
+    s.omega_yaw_p = s.sum_s = s.spin_rad_s = 0.0
+    for i in range(3):
+        s.omega_p_b[i] = s.omega_i_b[i] = s.omega_sum_b[i] = s.omega_b_rad_s[i] = 0.0
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i]
 
 
 @kernel

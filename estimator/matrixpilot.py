@@ -62,7 +62,7 @@ from estimator.matrixpilot_params import CLASSIC as CLASSIC
 from estimator.matrixpilot_params import UDB4 as UDB4
 from estimator.matrixpilot_params import UDB5 as UDB5
 from estimator.matrixpilot_params import MatrixPilotParams
-from estimator.rotation import level, propagate, renormalise
+from estimator.rotation import NEAR, level, propagate, renormalise
 from estimator.screening import (
     FORCE_GOOD,
     G_M_S2,
@@ -205,8 +205,9 @@ def renormalise_keeping_tilt(R_eb, fixed_point):  # type: ignore[no-untyped-def]
         square = R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2
         if not abs(square - 1.0) < 0.1:  # no longer within reach of Eqn 21
             return renormalise(R_eb)
+        scale = 1.5 - 0.5 * square if abs(square - 1.0) < NEAR else 1.0 / np.sqrt(square)  # Eqn 21
         for j in range(3):
-            R_eb[i, j] *= 1.5 - 0.5 * square  # Eqn 21
+            R_eb[i, j] *= scale
         if fixed_point:
             _store(R_eb[i], MATRIX_COUNT)
     return True

@@ -14,6 +14,7 @@ from estimator.jit import inlined
 from estimator.rotation import from_euler
 
 G_M_S2 = 9.80665
+SHORTEST_INTERVAL_S = 1e-6  # no gyro samples faster, and what is divided by an interval stays finite
 LONGEST_GAP_S = 0.5  # a longer silence says nothing of the attitude: the estimate goes on from where it was
 CLOCK_BACK_S = 1.0  # a time this far back is no late sample but a clock that was set
 COAST_S = 0.25  # how long the last good rate stands in for a broken gyro
@@ -54,7 +55,7 @@ def _within(a, limit):  # type: ignore[no-untyped-def]
 def _interval_s(row, s):  # type: ignore[no-untyped-def]
     """How much time this sample accounts for; 0 where its time or interval cannot be."""
     t, dt = row.t_s, row.dt_s
-    if not (np.isfinite(t) and 0.0 < dt <= LONGEST_GAP_S):
+    if not (np.isfinite(t) and SHORTEST_INTERVAL_S <= dt <= LONGEST_GAP_S):
         return 0.0
     if s.started:
         gap = t - s.t_s

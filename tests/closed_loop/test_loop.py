@@ -116,7 +116,7 @@ def test_simulation_that_blows_up_keeps_the_rows_before_and_the_cause():
     assert flight.message == "the simulation blew up at 1.42 s: nan m/s"
 
 
-def test_interrupt_in_flight_keeps_the_rows_before():
+def test_interrupt_in_flight_keeps_the_rows_before(ctrl_c):
     """Ctrl-C is an outcome; nothing flown is lost."""
 
     class Stopped(Level):
@@ -125,11 +125,7 @@ def test_interrupt_in_flight_keeps_the_rows_before():
                 signal.raise_signal(signal.SIGINT)
             return super().update(m)
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored: nohup, make test &
-    try:
-        flight = flown(estimator=Stopped())
-    finally:
-        signal.signal(signal.SIGINT, before)
+    flight = flown(estimator=Stopped())
     assert (flight.outcome, len(flight.log)) == (Outcome.INTERRUPTED, 30)
 
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -14,7 +14,6 @@ from autopilot.interface import ActuatorCommand, Autopilot, Mode, Setpoint, Wayp
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
 
 NAMES = sorted(AUTOPILOTS)
-compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
 finite = st.floats(-1e6, 1e6)
 vector = st.tuples(finite, finite, finite)
 ROUTE = (Waypoint(100.0, 0.0, 60.0), Waypoint(100.0, 150.0, 80.0), Waypoint(-50.0, 0.0, 60.0))
@@ -71,12 +70,12 @@ def test_autopilot_speaks_the_protocol(name):
     assert isinstance(make(name), Autopilot)
 
 
+@pytest.mark.hypothesis
 @pytest.mark.parametrize("name", NAMES)
 def test_update_any_rotation_and_measurement_gives_a_command_within_limits(name):
     """Any attitude, rate, wind and finite measurement, in any mode, one after the other."""
     autopilot = make(name)
 
-    @compiled
     @given(
         quaternion=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: math.hypot(*q) > 1e-3),
         omega=vector, wind=st.none() | vector, force=vector, position=vector, velocity=vector,

@@ -183,7 +183,7 @@ FLAGS = st.lists(
 
 
 @pytest.mark.parametrize("name", sorted(package.ESTIMATORS))
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=settings.default.max_examples * 2 // 5)
 @given(spoilt=SPOILT, clock=CLOCK, flags=FLAGS, on_ground=st.sampled_from([None, np.nan, 1e9, 0.01]))
 def test_garbage_never_drives_the_attitude_off_the_rotations(name, spoilt, clock, flags, on_ground):
     """Any number in any column for a while, NaN and infinities too; times that repeat, run back, leap; any power-up."""

@@ -264,7 +264,7 @@ def test_hands_off_cruise_stays_upright_for_a_minute(plant, trimmed):
 wild_rate = st.floats(-6.0, 6.0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4)
 @given(
     quaternion=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
     v_b=st.tuples(st.floats(-15.0, 25.0), st.floats(-15.0, 15.0), st.floats(-15.0, 15.0)),

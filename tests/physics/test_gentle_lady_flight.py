@@ -267,7 +267,7 @@ def test_halving_the_time_step_converges_at_first_order():
 wild_rate = st.floats(-6.0, 6.0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=settings.default.max_examples // 4)
 @given(
     quaternion=st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1),
     v_b=st.tuples(st.floats(-15.0, 20.0), st.floats(-12.0, 12.0), st.floats(-12.0, 12.0)),

@@ -261,6 +261,22 @@ def test_nothing_takes_it_off_the_rotations(quirks):
         assert np.all(np.isfinite(estimates[name]))
 
 
+@pytest.mark.parametrize("spoilt", ["omega_i_b", "omega_p_b", "omega_sum_b", "omega_yaw_p", "R_eb", "R_euler_eb"])
+def test_number_that_is_none_in_a_correction_is_gone_with_the_next_sample(spoilt):
+    """NaN in the state, however it got there: the attitude of before, no corrections, and the flight goes on."""
+    rows, _ = turning(20)
+    estimator = ApDcm()
+    estimator.replay(rows[:500])
+    broken = estimator.snapshot()
+    before = broken["R_eb"][0].copy()
+    broken[spoilt] = np.nan
+    estimator.restore(broken)
+    estimates = estimator.replay(rows[500:])
+    for name in ("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s"):
+        assert np.all(np.isfinite(estimates[name])), name
+    assert np.degrees(inclination_error_rad(estimates["R_eb"][0], before)) < 1.0  # no more than a tick of the turn
+
+
 def test_lost_samples_of_the_accelerometer_do_not_tilt():
     """Every third sample lost in a turn: the mean is over those that came, and so the tilt stays right."""
     rows, truth = turning(60, compass=True)

@@ -5,7 +5,7 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
@@ -30,7 +30,6 @@ PARAMS = EnergyParams()
 CRUISE_M_S, DT_S = PARAMS.airspeed_m_s, 0.02
 UNKNOWN = np.full(3, np.nan)
 LADY = params_of("gentle_lady")
-compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
 
 
 def record(params=None):
@@ -80,7 +79,6 @@ def test_airspeed_of_a_tube_that_fell_silent_is_forgotten():
     np.testing.assert_allclose(believed(silent, (3.0, -11.0, 0.0), s), math.hypot(3.0, 7.0), rtol=0, atol=1e-2)
 
 
-@compiled
 @given(course=st.floats(-3.0, 3.0), wind_to=st.floats(-3.0, 3.0), wind=st.floats(0.0, 12.0))
 def test_airspeed_from_gps_and_wind_is_the_wind_triangle(course, wind_to, wind):
     """Ground velocity less wind, whatever the two are: nose times airspeed as a complex number comes back."""
@@ -238,7 +236,6 @@ def test_hold_height_energy_missing_is_learnt_by_the_throttle_where_the_speed_is
     assert s["throttle_integral"] == 0.0
 
 
-@compiled
 @given(height=st.floats(-500.0, 500.0), slow=st.floats(0.05, 2.0), climb=st.floats(-3.0, 3.0))
 def test_hold_height_too_slow_lowers_the_nose_whatever_height_is_asked(height, slow, climb):
     """Below 1.2 times the stalling speed sink is demanded, and nothing teaches the nose to rise."""

@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -28,7 +28,6 @@ PARAMS = GuidanceParams()
 CRUISE_M_S = 12.6
 LIMIT_RAD = math.radians(35.0)
 UNKNOWN = np.full(3, np.nan)
-compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
 angle = st.floats(-math.pi, math.pi)
 course = st.floats(0.0, 2.0 * math.pi)
 
@@ -61,7 +60,6 @@ def wrapped(rad):
     return math.remainder(rad, 2.0 * math.pi)
 
 
-@compiled
 @given(flown=course, wanted=course, pitch=st.floats(-1.5, 1.5), roll=angle)
 def test_heading_error_any_attitude_equals_the_wrapped_course_difference(flown, wanted, pitch, roll):
     """Cross and dot product of the nose vector give the sine and cosine of the difference, also inverted."""
@@ -70,7 +68,6 @@ def test_heading_error_any_attitude_equals_the_wrapped_course_difference(flown, 
     np.testing.assert_allclose(wrapped(math.atan2(sine, cosine) - (wanted - flown)), 0.0, rtol=0, atol=1e-9)
 
 
-@compiled
 @given(error=angle)
 def test_bank_for_heading_turns_the_shorter_way_and_saturates_beyond_a_right_angle(error):
     """The bank has the sign of the course difference; more than 90 degrees off it is the limit."""
@@ -91,7 +88,6 @@ def test_bank_for_heading_dead_astern_keeps_to_the_side_of_the_bank():
             assert bank == math.copysign(LIMIT_RAD, r_zy)
 
 
-@compiled
 @given(heading=course, blows_to=course, speed=st.floats(0.0, 9.0))
 def test_direction_of_travel_nose_with_wind_is_the_wind_triangle(heading, blows_to, speed):
     """Nose times airspeed plus wind, as complex numbers."""
@@ -158,7 +154,6 @@ def test_height_climbing_is_moved_on_by_the_age_of_the_fix():
     np.testing.assert_allclose(height(row_of((0, 0, -30.0), (0, 0, -2.0)), record()), 32.6, rtol=0, atol=1e-9)
 
 
-@compiled
 @given(bearing=course, flown=course, distance=st.floats(80.0, 2000.0))
 def test_bank_to_return_turns_towards_the_launch_point(bearing, flown, distance):
     """The bank has the sign of the angle from the course flown to the bearing of the launch point."""

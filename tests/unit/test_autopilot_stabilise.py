@@ -5,7 +5,7 @@ from dataclasses import astuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -25,7 +25,6 @@ ROUND_OFF = 1e-12  # a dozen products of numbers up to a few units
 PARAMS = StabiliseParams()
 STILL = np.zeros(3)
 CRUISE_M_S = PARAMS.airspeed_m_s
-compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
 angle = st.floats(-math.pi, math.pi)
 pitch = st.floats(-1.5, 1.5)
 
@@ -48,7 +47,6 @@ def control_of(demand, R_eb, omega):
     return rate_control(demand, R_eb, omega, CRUISE_M_S, state(), record(), 0.0)
 
 
-@compiled
 @given(roll=angle, pitch=pitch, yaw=angle, bank=st.floats(-1.4, 1.4))
 def test_roll_error_any_attitude_rolling_that_way_brings_the_wings_nearer(roll, pitch, yaw, bank):
     """A small body roll in the direction of the error turns the vertical towards the demanded one."""
@@ -63,7 +61,6 @@ def test_roll_error_any_attitude_rolling_that_way_brings_the_wings_nearer(roll, 
     assert after > before
 
 
-@compiled
 @given(roll=st.floats(-1.5, 1.5), pitch=pitch, yaw=angle)
 def test_roll_error_upright_for_wings_level_is_minus_r_zy(roll, pitch, yaw):
     """For wings level the error is the paper's r_zy, with the sign that removes it."""
@@ -71,7 +68,6 @@ def test_roll_error_upright_for_wings_level_is_minus_r_zy(roll, pitch, yaw):
     np.testing.assert_allclose(roll_error(R, STILL, 0.0, 1.0), -R[2, 1], rtol=0, atol=ROUND_OFF)
 
 
-@compiled
 @given(roll=angle, yaw=angle, bank=st.floats(-1.4, 1.4))
 def test_roll_error_level_nose_equals_sine_or_saturates(roll, yaw, bank):
     """With the nose level it is the sine of the missing bank, and full beyond 90 degrees."""
@@ -107,7 +103,6 @@ def test_elevator_inverted_is_never_up(degrees, nose_deg):
     assert control_of(demand, R, STILL)[1] <= 0.0
 
 
-@compiled
 @given(roll=st.floats(-1.3, 1.3), pitch=st.floats(-1.2, 1.2), wanted=st.floats(-0.5, 0.5), yaw=angle)
 def test_pitch_demand_upright_turns_the_nose_towards_the_demand(roll, pitch, wanted, yaw):
     """A small rotation by the demanded pitch rate, less the turn's, moves the nose towards the demanded pitch."""
@@ -120,7 +115,6 @@ def test_pitch_demand_upright_turns_the_nose_towards_the_demand(roll, pitch, wan
     assert np.sign(-turned[2, 0] + R[2, 0]) == np.sign(wanted - pitch)
 
 
-@compiled
 @given(bank=st.floats(-1.0, 1.0), yaw=angle)
 def test_rate_demand_coordinated_turn_is_the_turn_seen_in_the_body(bank, yaw):
     """Banked as demanded, nose level: the demand is R^T (0, 0, g tan(bank) / V), pitch and yaw rate alike."""
@@ -132,7 +126,6 @@ def test_rate_demand_coordinated_turn_is_the_turn_seen_in_the_body(bank, yaw):
     )
 
 
-@compiled
 @given(bank=st.floats(-1.0, 1.0))
 def test_rate_control_coordinated_turn_does_not_leak_into_the_pitch_damping(bank):
     """The mixing problem: in a true turn the elevator is the one of the load alone, none of it damps the turn."""
@@ -171,7 +164,6 @@ def test_elevator_grows_with_bank_on_either_side():
     assert np.all(np.diff(elevators) > 0.01)
 
 
-@compiled
 @given(bank=st.floats(-1.04, 1.04))
 def test_extra_lift_level_turn_is_one_over_r_zz_minus_one(bank):
     """V q / g + r_zz - 1 with the pitch rate of a level turn is the load factor less one, 1 / cos(bank) - 1."""
@@ -188,7 +180,6 @@ def test_extra_lift_loop_is_centripetal_with_or_against_the_weight(r_zz, less):
     np.testing.assert_allclose(extra_lift(q, r_zz, CRUISE_M_S, record()), expected, rtol=0, atol=ROUND_OFF)
 
 
-@compiled
 @given(roll=angle, pitch=pitch, yaw=angle, omega=st.tuples(*[st.floats(-5.0, 5.0)] * 3))
 def test_rate_control_more_rate_gives_less_control(roll, pitch, yaw, omega):
     """Damping: turning quicker about an axis always lowers that axis' control."""
@@ -199,7 +190,6 @@ def test_rate_control_more_rate_gives_less_control(roll, pitch, yaw, omega):
         assert after[axis] < before[axis]
 
 
-@compiled
 @given(roll=angle, pitch=pitch, yaw=angle, bank=st.floats(-1.4, 1.4), nose=st.floats(-0.5, 0.5))
 def test_rate_demand_inverted_is_upright_in_axes_turned_half_round_the_nose(roll, pitch, yaw, bank, nose):
     """Turned by 180 degrees about x, the same demand: p the same, q and r the opposite."""
@@ -212,7 +202,6 @@ def test_rate_demand_inverted_is_upright_in_axes_turned_half_round_the_nose(roll
     np.testing.assert_allclose(inverted, (upright[0], -upright[1], -upright[2]), rtol=0, atol=1e-9)
 
 
-@compiled
 @given(bank=st.floats(-1.0, 1.0), yaw=angle)
 def test_rate_demand_inverted_turn_goes_the_same_way_over_the_ground(bank, yaw):
     """A positive bank turns right on the back too: the rate about the vertical is g tan(bank) / V."""
@@ -231,7 +220,6 @@ def test_elevator_inverted_level_is_down_elevator_for_two_g_less():
     assert extra_lift(-10.0, -1.0, CRUISE_M_S, record()) == -PARAMS.inverted_lift - 1.0
 
 
-@compiled
 @given(speed=st.floats(8.0, 20.0), rate=st.floats(-2.0, 2.0), axis=st.sampled_from([0, 2]))
 def test_rate_control_deflection_for_a_rate_goes_with_one_over_speed(speed, rate, axis):
     """The same helix angle p b / 2 V takes the same deflection."""
@@ -241,7 +229,6 @@ def test_rate_control_deflection_for_a_rate_goes_with_one_over_speed(speed, rate
     np.testing.assert_allclose(fast, at_cruise * CRUISE_M_S / speed, rtol=0, atol=ROUND_OFF)
 
 
-@compiled
 @given(speed=st.floats(8.0, 20.0), load=st.floats(0.2, 1.3))
 def test_extra_lift_for_a_load_goes_with_one_over_speed_squared(speed, load):
     """L = n W: the lift coefficient is n (V_c / V)^2 of that at cruise."""

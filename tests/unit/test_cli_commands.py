@@ -151,7 +151,7 @@ def test_fly_estimator_that_prints_leaves_the_json_alone(capfd) -> None:
     assert "noise" in stderr
 
 
-def test_fly_interrupted_keeps_the_recording_up_to_there(here: Path, capsys) -> None:
+def test_fly_interrupted_keeps_the_recording_up_to_there(here: Path, ctrl_c, capsys) -> None:
     """Ctrl-C in the middle of the air: exit code 130, and a whole recording of the part that was flown."""
     Path("own.py").write_text(DOUBTFUL, encoding="utf-8")
     assert run([*SHORT, "--estimator", "own.py:Doubtful"]) == 130
@@ -186,7 +186,7 @@ def test_check_reports_for_people_and_for_ci_are_written(here: Path) -> None:
     assert "inclination error RMS" in (here / "m.md").read_text(encoding="utf-8")
 
 
-def test_check_interrupted_keeps_what_was_finished(here: Path, monkeypatch, in_process, capfd) -> None:
+def test_check_interrupted_keeps_what_was_finished(here: Path, ctrl_c, in_process, monkeypatch, capfd) -> None:
     """Ctrl-C in the third of four flights: two are judged, marked as not all, and exit code 130."""
     really, flown = gate.fly_scenario, []
 

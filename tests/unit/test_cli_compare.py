@@ -137,7 +137,7 @@ def test_compare_estimator_that_fails_is_exit_code_1_and_the_others_fly(here: Pa
     assert "ZeroDivisionError" in capsys.readouterr().out
 
 
-def test_compare_interrupted_keeps_what_was_finished(here: Path, monkeypatch, in_process, capsys) -> None:
+def test_compare_interrupted_keeps_what_was_finished(here: Path, ctrl_c, in_process, monkeypatch, capsys) -> None:
     """Ctrl-C in the fourth of six flights: three are told, each estimator has at least one, exit code 130."""
     really, flown = compare.fly_scenario, []
 

@@ -28,7 +28,7 @@ MINUTE = 1e-7  # unit of an NMEA minute
 M_PER_DEG = 111_700.0  # of latitude at the pole, where a degree is longest; of longitude at most 111 320 m
 READ_DEG = 0.5e-10  # pynmeagps rounds degrees to ten digits
 FLOAT_M = 1e-7  # earth-centred coordinates are 6e6 m long, and pymap3d goes through them and back
-ROUND_TRIP = settings(max_examples=60, deadline=None)
+ROUND_TRIP = settings(max_examples=settings.default.max_examples * 3 // 5)
 
 
 def fixes_of(t_s, p_e_m, v_e_m_s, accuracy: Accuracy = Accuracy(2.1, 2.5, 0.1)) -> Fixes:  # noqa: B008
@@ -545,7 +545,6 @@ def test_ubx_among_other_protocols_is_found() -> None:
 
 
 @pytest.mark.parametrize(("encode", "decode"), [(encode_nmea, decode_nmea), (encode_ubx, decode_ubx)])
-@settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_one_damaged_byte_costs_one_fix_at_most(encode, decode, data) -> None:
     """Both checksums find any single damaged byte, and no other fix suffers."""
@@ -564,7 +563,7 @@ def test_one_damaged_byte_costs_one_fix_at_most(encode, decode, data) -> None:
 
 
 @pytest.mark.parametrize("decode", [decode_nmea, decode_ubx])
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=settings.default.max_examples * 2)
 @given(noise=st.lists(st.one_of(st.binary(max_size=40), st.sampled_from([FIRST, FIRST[:30], gga("120000"), rmc("x")]))))
 def test_bytes_of_any_kind_are_read_or_refused(decode, noise: list[bytes]) -> None:
     """Nothing in a file makes a reader fail in another way than by its one line."""
@@ -575,7 +574,7 @@ def test_bytes_of_any_kind_are_read_or_refused(decode, noise: list[bytes]) -> No
 
 
 @pytest.mark.parametrize("sentences", ["GPGGA,120000,{}", "GPRMC,120000,{}", "GPVTG,{}"])
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=settings.default.max_examples * 3 // 2)
 @given(payload=st.lists(st.sampled_from(["", "1", "-1", "nan", "inf", "A", "N", "E", "4807.038", "1e999", "é", "0"])))
 def test_sentence_of_any_fields_is_read_or_refused(sentences: str, payload: list[str]) -> None:
     """A sentence with a good checksum and senseless fields loses no other fix."""

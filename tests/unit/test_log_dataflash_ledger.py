@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from scenarios.harness import logs
 from scenarios.harness.logs.recorded import LogError
 
-SLOW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SLOW = settings(
+    max_examples=settings.default.max_examples * 2 // 5, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 HOW = ["drop", "double", "zero", "noise", "flip"]
 GPS_STATUS, GPS_TIME = 2, 0  # places in the fields of a message
 OF_2013 = "BIHBcLLeeCCf", "Status,TimeMS,Week,NSats,HDop,Lat,Lng,RelAlt,Alt,Spd,GCrs,VZ"

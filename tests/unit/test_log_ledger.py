@@ -16,7 +16,9 @@ from scenarios.harness.logs.tabular import recorded
 
 N = 60
 STREAMS = {"gps": "gps_new", "magnetometer": "mag_new"}
-MANY = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+MANY = settings(
+    max_examples=settings.default.max_examples * 3 // 2, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 def agree(log):

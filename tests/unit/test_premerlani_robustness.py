@@ -63,7 +63,7 @@ def assert_rotations(R):
     assert np.all(np.linalg.det(R) > 0.0)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=settings.default.max_examples * 3)
 @given(
     st.lists(ROW, min_size=1, max_size=60),
     st.fixed_dictionaries({name: st.booleans() for name in SWITCHES}),
@@ -84,7 +84,7 @@ def test_replay_whatever_comes_stays_a_finite_rotation(drawn, switches, gate, cl
     assert np.all(np.isfinite(estimates["gyro_bias_b_rad_s"]))
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=settings.default.max_examples // 2)
 @given(ANY, ANY, st.tuples(ANY, ANY, ANY), st.tuples(ANY, ANY, ANY))
 def test_reset_whatever_sample_comes_starts_from_a_rotation(t, dt, gyro, force):
     """A calibration of nonsense is ignored, the flight goes on."""
@@ -95,7 +95,7 @@ def test_reset_whatever_sample_comes_starts_from_a_rotation(t, dt, gyro, force):
     assert np.all(np.isfinite(estimates["gyro_bias_b_rad_s"]))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=settings.default.max_examples * 3 // 10)
 @given(st.integers(0, 10**6), st.floats(0.0, 0.9))
 def test_replay_jittered_intervals_and_lost_samples_stay_a_rotation(seed, lost):
     """Irregular intervals and missing rows are no error, and nothing is rejected."""

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.airframes import AutopilotParams
@@ -32,7 +32,6 @@ from estimator.interface import MEASURED_DTYPE
 G, V, DT_S, LATENCY_S = 9.80665, EnergyParams().airspeed_m_s, 0.02, 0.3
 LIMIT_RAD = math.radians(35.0)
 SQUARE = (Waypoint(250, 0, 60), Waypoint(250, 250, 60), Waypoint(0, 250, 60), Waypoint(0, 0, 60))
-compiled = settings(deadline=None, derandomize=True)  # the first call of a kernel compiles it
 angle = st.floats(-math.pi, math.pi)
 CALM, UNKNOWN = 0j, np.full(3, np.nan)
 
@@ -108,7 +107,6 @@ def flown(setpoint, seconds, *, start=0j, heading=0.0, wind=CALM, route=None, wi
     return at, bank, due
 
 
-@compiled
 @given(radius=st.floats(10.0, 500.0), share=st.floats(0.05, 1.9), course=angle, left=st.booleans())
 def test_circle_being_flown_asks_for_the_bank_that_it_needs(radius, share, course, left):
     """On the circle, along it: a = V^2 / r exactly, whatever the distance of the reference point."""
@@ -122,7 +120,6 @@ def test_circle_being_flown_asks_for_the_bank_that_it_needs(radius, share, cours
     np.testing.assert_allclose(bank, needed, rtol=0, atol=1e-9)
 
 
-@compiled
 @given(
     distance=st.floats(1.0, 1000.0), bearing=angle, radius=st.floats(10.0, 500.0), left=st.booleans(),
     ahead=st.floats(1.0, 60.0),
@@ -141,7 +138,6 @@ def test_aim_at_circle_is_a_point_of_the_circle_further_round(distance, bearing,
         np.testing.assert_allclose(abs(side), radius, rtol=1e-6, atol=0)
 
 
-@compiled
 @given(course=angle, right_of_it=st.floats(-500.0, 500.0), ahead=st.floats(5.0, 80.0))
 def test_aim_at_line_is_a_point_of_the_line_met_at_45_degrees_at_most(course, right_of_it, ahead):
     """Off to the right the aim is to the left of the line, by the sine of the distance over the way ahead."""
@@ -307,7 +303,6 @@ def test_begin_of_turn_back_the_way_it_came_is_finite():
     assert sharpest < 60.0
 
 
-@compiled
 @given(course=angle, blows_to=angle, speed=st.floats(0.0, 9.0))
 def test_speed_along_is_the_wind_triangle(course, blows_to, speed):
     """Minus the wind, it is the airspeed."""
