@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.io import loadmat  # type: ignore[import-untyped]
 
 from estimator.interface import Array
 from scenarios.harness.logs import ardupilot_matlab, dataflash, foreign, tabular
@@ -19,6 +18,7 @@ from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
 from scenarios.harness.logs.column_names import automatic
 from scenarios.harness.logs.quantities import Meaning
 from scenarios.harness.logs.recorded import LogError, RecordedLog
+from sim import files, sandbox
 
 LABELS = ("_label", "_labels", "_names", "_header")  # behind the name of a matrix: the array of its columns' names
 WIDEST = 64  # a matrix with more columns is no table
@@ -60,19 +60,24 @@ def groups(path: Path) -> tuple[list[tabular.Group], Source, tuple[str, ...]]:
 
 def _content(path: Path) -> dict[str, Any]:
     """The variables of a file; LogError where it cannot be read."""
-    try:
-        head = path.read_bytes()[:520]
-    except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+    head = files.head(path, 520, "log")
     if head.startswith(b"MATLAB 7.3") or b"\x89HDF\r\n" in head:
         raise LogError(f"{path}: a MATLAB file of version 7.3 (HDF5): {_SAVE}")
     try:
-        content = {name: v for name, v in loadmat(path, squeeze_me=True).items() if not name.startswith("__")}
-    except Exception as error:  # scipy raises whatever its parser meets in a file cut off or foreign
+        content = sandbox.call("scipy.io:loadmat", path, squeeze_me=True)
+    except sandbox.TooLong:
+        raise LogError(f"{path}: cannot be read: the MATLAB reader did not come back in {sandbox.LONGEST_S:g} s") from None
+    except sandbox.TooLarge as error:
+        size, most = files.size(path.stat().st_size), files.size(int(str(error)))
+        raise LogError(f"{path}: {size}, but its content takes more than {most} of memory: damaged, or no log") from None
+    except sandbox.Crashed:
+        raise LogError(f"{path}: cannot be read: the MATLAB reader crashed on it (the file is damaged)") from None
+    except sandbox.Failed as error:  # scipy raises whatever its parser meets in a file cut off or foreign
         found = foreign.hint(head) if head else "an empty file"
         if found and not head.startswith(b"MATLAB"):
-            raise LogError(f"{path}: not a MATLAB file; this is {found}") from error
-        raise LogError(f"{path}: cannot be read as a MATLAB file: {' '.join(str(error).split())}") from error
+            raise LogError(f"{path}: not a MATLAB file; this is {found}") from None
+        raise LogError(f"{path}: cannot be read as a MATLAB file: {error}") from None
+    content = {name: v for name, v in content.items() if not name.startswith("__")}
     objects = [name for name, v in content.items() if type(v).__name__ in ("MatlabOpaque", "MatlabFunction")]
     if objects and not any(np.asarray(v).dtype.kind in "fiubV" for n, v in content.items() if n not in objects):
         names = ", ".join(name for name in objects if name != "None") or "it"
