@@ -223,6 +223,7 @@ def _plain_command(command: ActuatorCommand) -> ActuatorCommand:
     if len(command) != len(names):
         raise Unusable(f"the ActuatorCommand has {len(command)} fields, must have {len(names)}")
     plain: dict[str, Any] = {}
+    value: Any
     for name, value in zip(names, command, strict=True):
         if name == "mode":
             try:
