@@ -226,7 +226,7 @@ def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int
 
     Raises
     ------
-    ValueError      no such estimator      NotTimed    one that fails, or on which the aeroplane does not stay in the air
+    ValueError      no such estimator      NotTimed    one that fails, or does not keep the aeroplane in the air
     """
     try:
         return _measured(estimator, seconds, repeats, advance)
