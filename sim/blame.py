@@ -86,10 +86,10 @@ def told(error: BaseException, home: str = "") -> str:
 def place_of(error: BaseException, home: str = "") -> str:
     """Where in others' code `error` was raised: ``own.py, line 12, in update``; empty where not in theirs.
 
-    Empty for a syntax error too: its text says where.
+    Empty for a syntax error of a file too: its text says where.
     """
     try:
-        if issubclass(type(error), SyntaxError) and isinstance(getattr(error, "lineno", None), int):
+        if issubclass(type(error), SyntaxError) and not str(error.filename or "<").startswith("<"):  # type: ignore[attr-defined]
             return ""
         found, step = "", BaseException.__dict__["__traceback__"].__get__(error)
         while step is not None:

@@ -74,10 +74,14 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What one update costs, ns: a call of `update`, and of a whole log in one call where there is a `replay`."""
+    """What one update costs, ns: a call of `update`, and of a whole log in one call where there is a `replay`.
+
+    failure : one line on what was raised while it was timed
+    """
 
     update_ns: float
     replay_ns: float | None
+    failure: str = ""
 
     @property
     def ns(self) -> float:
@@ -90,7 +94,7 @@ class Entrant:
     """One estimator of the comparison: what it is given, and how its flights went.
 
     given : the instruments that it uses and that are fitted       n_planned : flights it was to fly
-    pooled : the scenario's checks over all its flights; None where none was flown      cost : None where not measured
+    pooled : the scenario's checks over all its flights; None where none was flown      timing : None where not measured
     """
 
     name: str
@@ -99,7 +103,12 @@ class Entrant:
     n_planned: int
     flights: tuple[Traced, ...]
     pooled: PooledVerdict | None
-    cost: Cost | None = None
+    timing: Cost | None = None
+
+    @property
+    def cost(self) -> Cost | None:
+        """What an update costs; None where it was not measured, or failed."""
+        return None if self.timing is None or self.timing.failure else self.timing
 
     @property
     def known(self) -> dict[str, Known]:
@@ -147,6 +156,7 @@ class Entrant:
             **{name: value if math.isfinite(value) else None for name, value in self.numbers.items()},
             "update_ns": self.cost.update_ns if self.cost else None,
             "replay_ns": self.cost.replay_ns if self.cost else None,
+            **({"failure": self.timing.failure} if self.timing and self.timing.failure else {}),
             "checks": len(self.pooled.rows) if self.pooled else 0,
             "checks_passed": self.checks_passed,
         }
@@ -175,7 +185,8 @@ class Comparison:
             return console.INTERRUPTED
         if Outcome.DIVERGED in outcomes:
             return 3
-        return 1 if outcomes & {Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED} else 0
+        not_timed = any(e.timing is not None and e.timing.failure for e in self.entrants)
+        return 1 if not_timed or outcomes & {Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED} else 0
 
     def to_json(self) -> dict[str, Any]:
         """All of it as plain data: a line per estimator, and the verdict on every flight as `check` writes it."""
@@ -334,12 +345,12 @@ def _costs(plan: Plan, failed: Container[str]) -> dict[str, Cost]:
             continue
         try:
             costs[name] = cost(name, rows, instruments_of(config))
-        except NotTimed as problem:  # its flights are kept
-            console.error(f"not timed: {problem}")
+        except _NotTimed as problem:  # its flights are kept
+            costs[name] = Cost(math.nan, None, str(problem))
     return costs
 
 
-class NotTimed(RuntimeError):
+class _NotTimed(RuntimeError):
     """An estimator that raised while it was timed."""
 
 
@@ -354,7 +365,7 @@ def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
         for m in inputs:
             update(m)
 
-    with theirs(lambda line: NotTimed(f"{name}: {line}"), home_of(estimator)):
+    with theirs(_NotTimed, home_of(estimator)):
         replay, update_ns = getattr(estimator, "replay", None), _least_ns(stream) / len(rows)
         return Cost(update_ns, None if replay is None else _least_ns(lambda: replay(rows)) / len(rows))
 
@@ -404,6 +415,8 @@ def tell(comparison: Comparison) -> None:
         out.print(Text(f"note        {line}"), soft_wrap=True)
     console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
+        if entrant.timing is not None and entrant.timing.failure:
+            out.print(Text(f"{entrant.name}, while it was timed: {entrant.timing.failure}", "red"), soft_wrap=True)
         for flown in entrant.flights:
             v = flown.verdict
             if v.outcome != Outcome.COMPLETED:
