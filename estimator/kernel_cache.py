@@ -11,6 +11,7 @@ in memory.  Both are told on one line.
 import hashlib
 import os
 import pickle
+import re
 import shutil
 import stat
 import sys
@@ -23,7 +24,7 @@ from typing import Any
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 
 from estimator import compiling, owner
-from estimator.sources import Sources
+from estimator.sources import OURS, Sources
 
 _KEPT = 4  # folders of one module, for other versions of its sources
 _IN_USE_S = 86_400.0  # a folder that was used within this time is left alone
@@ -59,7 +60,7 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     def __init__(self, py_func: Any, path: str) -> None:
         digest = _sources.digest(path)
         self._py_func, self._name, self._source = py_func, py_func.__qualname__, path
-        self._folder = base() / f"{Path(path).stem}-{digest}"
+        self._folder = base() / f"{_folder_name(py_func, path)}-{digest}"
         self._cache_path = str(self._folder)
         self._impl = _Impl(py_func, _Locator(self._folder, path, digest, py_func.__code__.co_firstlineno))
         self._cache_file = _Files(self._cache_path, self._impl.filename_base, digest)
@@ -101,6 +102,16 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         if any(removed) or not isinstance(fault, Damaged):
             what = str(fault) if isinstance(fault, Damaged) else f"{self._name} cannot be loaded ({_short(fault)})"
             compiling.trouble(f"{what}: discarded, compiling again")
+
+
+def _folder_name(py_func: Any, path: str) -> str:
+    """Of the module that `py_func` is of.
+
+    The compiler keeps the name of the module with what it made, and a file of others may be loaded under several.
+    """
+    module = str(py_func.__module__ or "")
+    ours = module.partition(".")[0] in OURS
+    return Path(path).stem if ours else re.sub(r"\W", "_", module)[-80:] or "nameless"
 
 
 class _Locator:

@@ -53,6 +53,7 @@ from scenarios.harness.cli_options import (
 from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
 from scenarios.harness.cli_values import Commands, number_in, whole_in
 from scenarios.harness.console import INTERRUPTED, USAGE
+from sim.blame import show_tracebacks
 from sim.signals import listening
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
@@ -90,8 +91,12 @@ def _root(
     quiet: Annotated[
         bool, typer.Option("--quiet", "-q", help="Print errors and how it went, no more; also after the command.")
     ] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Show the whole traceback where code of your own raises.")
+    ] = False,
 ) -> None:
     console.be_quiet(quiet)
+    show_tracebacks(traceback)
     if version:
         typer.echo(f"wingslevel {version_of('wingslevel')}")
         raise typer.Exit
@@ -242,7 +247,7 @@ def agree(
 
     with reporting(json_) as report:
         with usage():
-            reported = [] if report_only == "none" else names_of(report_only)
+            reported = [] if report_only == "none" else names_of(report_only, "--report-only")
             compared = agreement.compare(agreement.read(first), agreement.read(second), tolerance, reported)
         report(compared.to_json())
         agreement.tell(compared)  # last: a reader who closes the pipe loses no file
@@ -286,7 +291,7 @@ def compare(
             carried = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
             changes |= given({"withheld": withhold})
-            plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
+            plan = comparing.prepare(scenario, names_of(estimators, "--estimators"), gate.parse_seeds(seeds), changes)
             guard.stage("while it compared", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
                 compared = comparing.fly(plan, workers or crew.processors(), advance, limit_s=flight_timeout)
@@ -379,13 +384,13 @@ def replay(
         with usage():
             told = replaying.run(
                 log,
-                names_of(estimator),
+                names_of(estimator, "--estimator"),
                 out,
                 reference=reference,
                 columns=columns,
                 imu=imu,
                 params=changes_of(set_),
-                withheld=names_of(withhold),
+                withheld=names_of(withhold, "--withhold"),
                 window=Window(airborne, settle, calibration),
                 rerun=not no_rerun,
             )
@@ -410,8 +415,14 @@ def bench(
     with reporting(json_) as report:
         from scenarios.harness import bench as benchmark
 
-        with usage(), console.progress("measuring", "pairs") as advance:
-            speed = benchmark.measure(estimator or "premerlani", seconds, repeats, advance)
+        estimator = estimator or "premerlani"
+        try:
+            with usage(), console.progress("measuring", "pairs") as advance:
+                speed = benchmark.measure(estimator, seconds, repeats, advance)
+        except benchmark.NotTimed as problem:
+            report({"passed": False, "estimator": estimator, "failure": str(problem)})
+            console.error(str(problem))
+            return problem.exit_code
         benchmark.tell(speed)
         report(speed.to_json())
     return 0 if speed.passed else 1

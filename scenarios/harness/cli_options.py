@@ -193,9 +193,9 @@ def air(
     return given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
 
 
-def names_of(text: str | None) -> list[str]:
-    """Names of a list with commas; refused where one of them is empty."""
+def names_of(text: str | None, option: str) -> list[str]:
+    """Names of a list with commas, none where the option was not given; refused where one of them is empty."""
     names = [name.strip() for name in text.split(",")] if text is not None else []
     if not all(names):
-        raise refusal(f"{brief(text)}: an empty name; write names with commas between them")
+        raise refusal(f"{option} {brief(text)}: an empty name; write names with commas between them")
     return names

@@ -32,6 +32,7 @@ from scenarios.harness.plugins import (
     heading_reference_of,
     load_estimator,
     shared_settings,
+    uses_of,
     without,
 )
 from scenarios.harness.preflight import prepared, unheard_settings
@@ -39,6 +40,7 @@ from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, judge
 from scenarios.harness.workers import fly_each
+from sim.blame import home_of, theirs
 from sim.log import Outcome
 from sim.wording import markdown, printable
 
@@ -71,7 +73,7 @@ class Task:
     def fly(self) -> Traced:
         """Fly it, judge it, and keep its errors."""
         scenario = find(self.scenario)
-        flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator)
+        flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator, lenient=True)
         return Traced(judge(scenario, flight), inclination_error_deg(flight), heading_error_deg()(flight))
 
     def lost(self, outcome: Outcome, message: str) -> Traced:
@@ -82,10 +84,14 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What one update costs, ns: a call of `update`, and of a whole log in one call where there is a `replay`."""
+    """What one update costs, ns: a call of `update`, and of a whole log in one call where there is a `replay`.
+
+    failure : one line on what was raised while it was timed
+    """
 
     update_ns: float
     replay_ns: float | None
+    failure: str = ""
 
     @property
     def ns(self) -> float:
@@ -98,7 +104,7 @@ class Entrant:
     """One estimator of the comparison: what it is given, and how its flights went.
 
     given : the instruments that it uses and that are fitted       n_planned : flights it was to fly
-    pooled : the scenario's checks over all its flights; None where none was flown      cost : None where not measured
+    pooled : the scenario's checks over all its flights; None where none was flown      timing : None where not measured
     """
 
     name: str
@@ -107,7 +113,12 @@ class Entrant:
     n_planned: int
     flights: tuple[Traced, ...]
     pooled: PooledVerdict | None
-    cost: Cost | None = None
+    timing: Cost | None = None
+
+    @property
+    def cost(self) -> Cost | None:
+        """What an update costs; None where it was not measured, or failed."""
+        return None if self.timing is None or self.timing.failure else self.timing
 
     @property
     def known(self) -> dict[str, Known]:
@@ -155,6 +166,7 @@ class Entrant:
             **{name: value if math.isfinite(value) else None for name, value in self.numbers.items()},
             "update_ns": self.cost.update_ns if self.cost else None,
             "replay_ns": self.cost.replay_ns if self.cost else None,
+            **({"failure": self.timing.failure} if self.timing and self.timing.failure else {}),
             "checks": len(self.pooled.rows) if self.pooled else 0,
             "checks_passed": self.checks_passed,
         }
@@ -183,7 +195,8 @@ class Comparison:
             return console.INTERRUPTED
         if Outcome.DIVERGED in outcomes:
             return 3
-        return 1 if outcomes & {*FLIGHT_CODE_FAILED, Outcome.AUTOPILOT_FAILED} else 0
+        not_timed = any(e.timing is not None and e.timing.failure for e in self.entrants)
+        return 1 if not_timed or outcomes & {*FLIGHT_CODE_FAILED, Outcome.AUTOPILOT_FAILED} else 0
 
     def to_json(self) -> dict[str, Any]:
         """All of it as plain data: a line per estimator, and the verdict on every flight as `check` writes it."""
@@ -333,7 +346,7 @@ def given(estimator: object, config: FlightConfig) -> tuple[str, ...]:
     """The instruments that are fitted in this flight and that `estimator` can make something of."""
     suite = suite_params(config.suite, config.sensors, config.files)
     fitted = {name for name in LETTERS if getattr(suite, name, None) is not None}
-    return tuple(name for name in getattr(estimator, "uses", _UNKNOWN) if name in fitted)
+    return tuple(name for name in uses_of(estimator, _UNKNOWN) if name in fitted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -344,20 +357,23 @@ class _Timing:
     config: str  # as JSON
     estimator: str
 
-    def fly(self) -> Cost | None:
-        """Measure it."""
+    def fly(self) -> Cost:
+        """Measure it; its flights are kept where it raises."""
         config = FlightConfig.model_validate_json(self.config)
-        return cost(self.estimator, _measured(self.scenario, self.config), instruments_of(config))
+        try:
+            return cost(self.estimator, _measured(self.scenario, self.config), instruments_of(config))
+        except (_NotTimed, ValueError) as problem:  # the latter of a script that asks for a longer flight
+            return Cost(math.nan, None, str(problem))
 
-    def lost(self, _outcome: Outcome, _message: str) -> Cost | None:
-        """Its flights tell what is wrong with it."""
-        return None
+    def lost(self, outcome: Outcome, message: str) -> Cost:
+        """What is known of it where nothing came back."""
+        return Cost(math.nan, None, f"{outcome.replace('_', ' ')}: {message}")
 
 
 @lru_cache(maxsize=1)
 def _measured(scenario: str, config: str) -> NDArray[Any]:
     """Measurements of a flight."""
-    return fly_config(find(scenario), FlightConfig.model_validate_json(config)).log.measured
+    return fly_config(find(scenario), FlightConfig.model_validate_json(config), lenient=True).log.measured
 
 
 def _costs(plan: Plan, failed: Container[str], limit_s: float | None) -> dict[str, Cost]:
@@ -367,20 +383,27 @@ def _costs(plan: Plan, failed: Container[str], limit_s: float | None) -> dict[st
     # The oracle answers in a flight alone.
     timed = [name for name in plan.names if name not in failed and name != "oracle"]
     found = fly_each([_Timing(plan.named, config, name) for name in timed], 1, lambda _n, _total: None, limit_s=limit_s)
-    return {timed[i]: measured for i, measured in found.items() if measured is not None}
+    return {timed[i]: measured for i, measured in found.items()}
+
+
+class _NotTimed(RuntimeError):
+    """An estimator that raised while it was timed."""
 
 
 def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
     """Least time of several passes over `rows`, per row; a slow one is timed over fewer of them."""
-    estimator, inputs = equipped(name, instruments).code, [Measurements(rows, k) for k in range(len(rows))]
+    rows = rows.copy()  # an estimator may write into them
+    inputs = [Measurements(rows, k) for k in range(len(rows))]
+    estimator = equipped(name, instruments).code
 
     def stream() -> None:
         update = estimator.update
         for m in inputs:
             update(m)
 
-    replay = getattr(estimator, "replay", None)
-    return Cost(_least_ns(stream) / len(rows), None if replay is None else _least_ns(lambda: replay(rows)) / len(rows))
+    with theirs(_NotTimed, home_of(estimator)):
+        replay, update_ns = getattr(estimator, "replay", None), _least_ns(stream) / len(rows)
+        return Cost(update_ns, None if replay is None else _least_ns(lambda: replay(rows)) / len(rows))
 
 
 def _least_ns(run: Callable[[], Any]) -> float:
@@ -428,6 +451,8 @@ def tell(comparison: Comparison) -> None:
         console.line(f"note        {line}")
     console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
+        if entrant.timing is not None and entrant.timing.failure:
+            console.line(f"{entrant.name}, while it was timed: {entrant.timing.failure}", "red")
         for flown in entrant.flights:
             v = flown.verdict
             if v.outcome != Outcome.COMPLETED:
