@@ -46,7 +46,7 @@ from scenarios.harness.cli_options import (
     given,
     names_of,
 )
-from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
+from scenarios.harness.cli_reports import attempt, check_file, losses, refusal, reporting, usage, write
 from scenarios.harness.console import INTERRUPTED, USAGE
 from sim.signals import listening
 
@@ -70,8 +70,10 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     try:
-        with listening(), console.compiling_told():
+        with listening(), console.compiling_told(), losses() as lost:
             code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
+        if lost and code in (0, 1):
+            code = USAGE
     except typer.TyperException as problem:
         console.error(problem.format_message())
         return USAGE
@@ -239,7 +241,7 @@ def compare(
         if picture is not None:
             from scenarios.harness import compare_picture
 
-            with usage():
+            with attempt():
                 compare_picture.draw(compared, picture)
         write(markdown, compared.to_markdown)
         report(compared.to_json())
@@ -362,7 +364,7 @@ def aircraft(
         if picture is not None:
             from scenarios.harness import handbook_picture
 
-            with usage():
+            with attempt():
                 handbook_picture.draw(book, picture)
         report(book.to_json())
         handbook.tell(book)  # last: a reader who closes the pipe loses no file
@@ -398,7 +400,7 @@ def sensors(
         if picture is not None:
             from scenarios.harness import sensor_picture
 
-            with usage():
+            with attempt():
                 sensor_picture.draw(page, picture)
         report(page.to_json())
         sensor_page.tell(page)  # last: a reader who closes the pipe loses no file

@@ -12,6 +12,7 @@ from scenarios.harness import console, viewing
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config
 from scenarios.harness.preflight import prepared
+from scenarios.harness.recorder import record
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
@@ -20,12 +21,12 @@ from sim.log import Flight, Log, Outcome
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """A flight that was flown, recorded and judged; `shown` live, or not."""
+    """A flight that was flown, recorded and judged; no `folder` where it could not be written; `shown` live, or not."""
 
     scenario: Scenario
     flight: Flight
     judged: FlightVerdict
-    folder: Path
+    folder: Path | None
     shown: viewing.RealTime | None = None
 
     @property
@@ -41,7 +42,10 @@ class Flown:
 
     def to_json(self) -> dict[str, Any]:
         """The verdict, what the estimator was given of the instruments, and where the recording lies."""
-        return self._verdict.to_json() | {"known": to_json(self.judged.known), "recording": str(self.folder)}
+        return self._verdict.to_json() | {
+            "known": to_json(self.judged.known),
+            "recording": self.folder and str(self.folder),
+        }
 
 
 def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bool, live: bool, web: bool) -> Flown:
@@ -70,9 +74,7 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
     flight = replace(flight, manifest={**flight.manifest, "verdict": recording.plain(judged.rows)})  # for its story
     if live_view is not None:
         live_view.close(flight)
-    folder = recording.save(flight, _free_folder(into, scenario.name, config))
-    if rerun:
-        viewing.write_rerun(flight, folder)
+    folder = record(flight, into, _name(scenario.name, config), rerun=rerun)
     return Flown(scenario, flight, judged, folder, live_view)
 
 
@@ -91,19 +93,11 @@ def tell(flown: Flown) -> None:
         if event.level == "warn":
             out.print(Text(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow"), soft_wrap=True)
     console.print_known({judged.estimator: judged.known})
-    out.print(Text(f"recording   {flown.folder}\nto see it   wingslevel view {flown.folder}"), soft_wrap=True)
+    if flown.folder is not None:
+        out.print(Text(f"recording   {flown.folder}\nto see it   wingslevel view {flown.folder}"), soft_wrap=True)
 
 
-def _free_folder(into: Path, scenario: str, config: FlightConfig) -> Path:
-    """A new folder, made here: no flight is ever written over another, whoever else is flying."""
+def _name(scenario: str, config: FlightConfig) -> str:
+    """Name of the folder of a recording."""
     estimator = config.estimator.rpartition(":")[2]
-    name = f"{scenario}-{estimator}-seed{config.seed}"
-    i = 1
-    while True:
-        path = into / (name if i == 1 else f"{name}-{i}")
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
-            i += 1
-        else:
-            return path
+    return f"{scenario}-{estimator}-seed{config.seed}"
