@@ -14,9 +14,8 @@ import json
 import math
 import os
 import platform
-import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, is_dataclass
 from enum import Enum
 from importlib import metadata
@@ -29,6 +28,7 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from estimator.interface import Column
+from sim import drafts
 from sim.log import TABLES, Event, Flight, Log, Outcome
 
 PARQUET = "flight.parquet"
@@ -94,40 +94,49 @@ def check_writable(directory: str | Path) -> None:
     ------
     RecordingError    naming the directory and the reason
     """
-    directory, made = Path(directory), []
-    missing = [p for p in (directory, *directory.parents) if not p.exists()]
     try:
-        for path in reversed(missing):
-            path.mkdir()
-            made.append(path)
-        with tempfile.TemporaryFile(dir=directory) as file:
-            file.write(b"x")
+        drafts.probe(Path(directory))
     except OSError as error:
-        raise _unwritable(directory, error) from error
-    finally:
-        for path in reversed(made):
-            path.rmdir()
+        raise _unwritable(Path(directory), error) from error
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary name beside `path` to write to; rename it to `path` at the end, remove it on any exception.
 
+    Removes, before, what killed processes have left half written beside `path`.
+
     Raises
     ------
     RecordingError    where the system refuses to write
     """
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    temporary = drafts.hidden(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        drafts.sweep(path.parent)
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
         raise _unwritable(path, error) from error
     finally:
         # Also on Ctrl-C; where the rename was done there is nothing left to remove.
-        if os.path.lexists(temporary):
+        with suppress(OSError):
             temporary.unlink()
+
+
+@contextmanager
+def new_folder(into: Path, name: str) -> Iterator[drafts.Draft]:
+    """Give a new folder for a recording, which appears in `into` when the block is done: see `drafts.new_folder`.
+
+    Raises
+    ------
+    RecordingError    where the system refuses to write
+    """
+    try:
+        with drafts.new_folder(into, name) as draft:
+            yield draft
+    except OSError as error:
+        raise _unwritable(into / name, error) from error
 
 
 def save(flight: Flight, directory: str | Path) -> Path:
@@ -141,18 +150,25 @@ def save(flight: Flight, directory: str | Path) -> Path:
     record = _record(flight)
     manifest = directory / MANIFEST
     with replacing(directory / PARQUET) as path:
-        pq.write_table(
-            _table(flight.log, record),
-            path,
-            compression="zstd",
-            use_dictionary=[e.name for e in elements() if e.column.integer],
-            use_byte_stream_split=[e.name for e in elements() if not e.column.integer],  # halves noisy floats
-        )
+        _write_parquet(_table(flight.log, record), path)
         record["sha256"] = _sha256(path)
         manifest.unlink(missing_ok=True)  # never an old manifest beside a new flight, whenever we are interrupted
     with replacing(manifest) as path:
         path.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return directory
+
+
+def _write_parquet(table: pa.Table, path: Path) -> None:
+    try:
+        pq.write_table(
+            table,
+            path,
+            compression="zstd",
+            use_dictionary=[e.name for e in elements() if e.column.integer],
+            use_byte_stream_split=[e.name for e in elements() if not e.column.integer],  # halves noisy floats
+        )
+    except pa.ArrowException as error:  # what the system refuses is an OSError already
+        raise RecordingError(f"cannot write to {path}: {_first_line(error)}") from error
 
 
 def load(source: str | Path) -> Flight:

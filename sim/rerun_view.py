@@ -26,7 +26,7 @@ from sim.log import Event, Flight, Log, Phase
 from sim.mesh import Part, aeroplane, geometry_of
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
 from sim.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, Range, curves, limits
-from sim.recording import digest, replacing
+from sim.recording import RecordingError, digest, replacing
 from sim.story import setting, story
 from sim.viewer import Viewer as Viewer
 from sim.viewer import open_viewer as open_viewer
@@ -50,6 +50,8 @@ _TRACK_HZ, _MAP_HZ = 25.0, 10.0  # the drawn tracks; the aeroplane on the map
 _STEP_RAD = np.radians(0.5)  # a control surface is drawn within this of where it is
 _GHOST, _THINNEST, _DENSER = 105, 10.0, 80.0  # opacity of 255: the estimate; the propeller at no throttle, more at full
 _PALE = 0.75
+_FOOTER = 32  # bytes: offset and length of the index, its checksum, ``RRF2FOOT`` and a one
+_FLUSH_S = 120.0  # longest that Rerun may take to encode
 _CHASE_S = 1.5  # the chase view follows the path smoothed over about so long
 _LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
 _LANE_COLOURS: dict[str, dict[str, Colour]] = {
@@ -81,17 +83,42 @@ def write(flight: Flight, path: str | Path) -> Path:
     RecordingError    where the system refuses to write
     """
     path = Path(path)
-    scene = Scene.of(flight.manifest, flight.release_s, flight.heading_reference)
     with replacing(path) as temporary:
-        temporary.touch()  # a refusal is ours to word, not Rerun's
-        rec = _stream(flight.manifest, digest(flight)[:16])
-        lines = curves(flight.log, flight.heading_reference) if len(flight.log) else {}
-        rec.save(temporary, default_blueprint=_blueprint(flight.log, flight.release_s, limits(flight.log, lines)))
-        _send_fixed(rec, scene)
-        _send_rows(rec, scene, flight.log, lines, 0)
-        _send_end(rec, flight)
-        rec.disconnect()
+        temporary.write_bytes(_encoded(flight, path))
     return path
+
+
+def _encoded(flight: Flight, path: Path) -> bytes:
+    """The Rerun recording of `flight`, for a file at `path`.
+
+    Made in memory and written by us: Rerun's own writing to a file reports a full disk in its log alone.
+    """
+    scene = Scene.of(flight.manifest, flight.release_s, flight.heading_reference)
+    rec = _stream(flight.manifest, digest(flight)[:16])
+    lines = curves(flight.log, flight.heading_reference) if len(flight.log) else {}
+    stream = rec.binary_stream()  # type: ignore[misc] # attached to the class as a function of another module
+    layout = _blueprint(flight.log, flight.release_s, limits(flight.log, lines))
+    rec.send_blueprint(layout, make_active=False, make_default=True)
+    _send_fixed(rec, scene)
+    _send_rows(rec, scene, flight.log, lines, 0)
+    _send_end(rec, flight)
+    try:
+        data = stream.read(flush=True, flush_timeout_sec=_FLUSH_S) or b""
+    except RuntimeError as error:
+        raise RecordingError(f"cannot write to {path}: Rerun cannot encode it ({error})") from error
+    rec.disconnect()
+    if not _is_complete(data):
+        raise RecordingError(f"cannot write to {path}: Rerun has encoded a part of it alone")
+    return data
+
+
+def _is_complete(data: bytes) -> bool:
+    """Whether the bytes of a Rerun recording end in its footer, and that lies where it says."""
+    end = data[-_FOOTER:]
+    return (
+        end[20:28] == b"RRF2FOOT"
+        and len(data) == sum(int.from_bytes(end[i : i + 8], "little") for i in (0, 8)) + _FOOTER
+    )
 
 
 class LiveView:

@@ -50,7 +50,7 @@ from scenarios.harness.cli_options import (
     given,
     names_of,
 )
-from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
+from scenarios.harness.cli_reports import attempt, check_file, losses, refusal, reporting, usage, write
 from scenarios.harness.cli_values import Commands, number_in, whole_in
 from scenarios.harness.console import INTERRUPTED, USAGE
 from sim.blame import show_tracebacks
@@ -72,8 +72,10 @@ def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     console.be_tolerant()
     try:
-        with listening(), console.compiling_told():
+        with listening(), console.compiling_told(), losses() as lost:
             code = int(app(arguments, prog_name="wingslevel", standalone_mode=False) or 0)
+        if lost and code in (0, 1):
+            code = USAGE
     except typer.TyperException as problem:
         console.error(problem.format_message())
         return USAGE
@@ -298,7 +300,7 @@ def compare(
         if picture is not None:
             from scenarios.harness import compare_picture
 
-            with usage():
+            with attempt():
                 compare_picture.draw(compared, picture)
         write(markdown, compared.to_markdown)
         report(compared.to_json())
@@ -445,7 +447,7 @@ def aircraft(
         if picture is not None:
             from scenarios.harness import handbook_picture
 
-            with usage():
+            with attempt():
                 handbook_picture.draw(book, picture)
         report(book.to_json())
         handbook.tell(book)  # last: a reader who closes the pipe loses no file
@@ -485,7 +487,7 @@ def sensors(
         if picture is not None:
             from scenarios.harness import sensor_picture
 
-            with usage():
+            with attempt():
                 sensor_picture.draw(page, picture)
         report(page.to_json())
         sensor_page.tell(page)  # last: a reader who closes the pipe loses no file

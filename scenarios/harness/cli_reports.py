@@ -9,7 +9,7 @@ from typing import IO, Any, TextIO
 
 import typer
 
-from scenarios.harness import guard
+from scenarios.harness import console, guard
 from sim.wording import json_text
 
 
@@ -115,19 +115,54 @@ def _is_stream(path: Path) -> bool:
 
 
 def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
-    """Write a report, complete or not at all."""
+    """Write a report, complete or not at all; see `losses` for what happens where that cannot be."""
     if path is None:
         return
-    from sim.recording import replacing
+    from sim.recording import RecordingError, replacing
 
     made = content()
     data = made.encode("utf-8") if isinstance(made, str) else made
     target = path.resolve()  # what a link points to is replaced, not the link
-    if _is_stream(target):
-        try:
-            target.write_bytes(data)
-        except OSError as error:
-            raise refusal(f"cannot write to {path}: {error.strerror}") from error
-        return
-    with usage(), replacing(target) as temporary:
-        temporary.write_bytes(data)
+    with attempt():
+        if _is_stream(target):
+            try:
+                target.write_bytes(data)
+            except OSError as error:
+                raise RecordingError(f"cannot write to {path}: {error.strerror}") from error
+            return
+        with replacing(target) as temporary:
+            temporary.write_bytes(data)
+
+
+_lost: list[str] | None = None  # what could not be written inside `losses`
+
+
+@contextmanager
+def losses() -> Iterator[list[str]]:
+    """Inside the block a report that cannot be written does not end the command: it is told, and the rest goes on.
+
+    What was measured is not lost with the first file that finds no room.  Gives the list of the lines told.
+    """
+    global _lost
+    before, _lost = _lost, []
+    try:
+        yield _lost
+    finally:
+        _lost = before
+
+
+@contextmanager
+def attempt() -> Iterator[None]:
+    """What cannot be written inside the block is told on one line; outside `losses` it ends the command."""
+    try:
+        yield
+    except ValueError as problem:
+        lose(str(problem), problem)
+
+
+def lose(message: str, problem: Exception | None = None) -> None:
+    """Tell of something that could not be written; outside `losses` it ends the command."""
+    if _lost is None:
+        raise refusal(message) from problem
+    console.error(message)
+    _lost.append(message)

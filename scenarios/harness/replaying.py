@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from estimator.instruments import Instruments, property_names, to_json
-from scenarios.harness import console, logs, viewing
+from scenarios.harness import console, logs
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.plugins import shared_settings, without
+from scenarios.harness.recorder import record
 from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, known_to, make, replay, why_none
 from sim import recording
 
@@ -26,14 +27,15 @@ _SHOWN = (
 class Told:
     """A log and what the estimators made of it.
 
-    folders : their recordings, by name      not_judged : why nothing was judged, empty where something was
+    folders : their recordings, by name, None where one could not be written
+    not_judged : why nothing was judged, empty where something was
     notes : what was set for some of the estimators alone, a line each
     """
 
     log: RecordedLog
     judged_s: float
     replays: tuple[Replayed, ...]
-    folders: Mapping[str, Path]
+    folders: Mapping[str, Path | None]
     not_judged: str = ""
     notes: tuple[str, ...] = ()
 
@@ -60,7 +62,7 @@ class Told:
             "not_judged": self.not_judged or None,
             "notes": [*self.log.notes, *self.notes],
         }
-        each = {r.estimator: r.to_json() | {"recording": str(self.folders[r.estimator])} for r in self.replays}
+        each = {r.estimator: r.to_json() | {"recording": _place(self.folders[r.estimator])} for r in self.replays}
         alone = next(iter(each.values())) if len(each) == 1 else {}
         return {**about, "estimators": each, **alone}
 
@@ -100,22 +102,25 @@ def run(
     log = logs.read(path, reference=reference, columns=columns, imu=imu)
     for name in names:  # again with what the log tells: all are made before any is run
         make(name, of_each[name], known_to(log, withheld))
-    replays, folders = [], {}
+    replays: list[Replayed] = []
+    folders: dict[str, Path | None] = {}
     for name in names:
         with console.progress(f"replaying {name}", "") as advance:
             replays.append(replay(log, name, of_each[name], window, withheld, advance))
     stem = log.name.partition(".")[0]
     for replayed in replays:
         flight = as_flight(log, replayed, window)
-        folder = recording.save(flight, _free_folder(into, f"replay_{stem}-{replayed.estimator}"))
+        with console.progress(f"recording {replayed.estimator}", "") as _:
+            folder = record(flight, into, f"replay_{stem}-{replayed.estimator}", rerun=rerun)
         folders[replayed.estimator] = folder
-        if rerun:
-            with console.progress(f"recording {replayed.estimator}", "") as _:
-                viewing.write_rerun(flight, folder)
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
     notes = (*without(of_each, settings), *_ground_too(log))
     return Told(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
+
+
+def _place(folder: Path | None) -> str | None:
+    return None if folder is None else str(folder)
 
 
 def _ground_too(log: RecordedLog) -> list[str]:
@@ -154,7 +159,7 @@ def tell(told: Told) -> None:
     if told.not_judged:
         style = "bold red" if log.reference is not None else "yellow"
         console.line(f"nothing judged: {told.not_judged}", style)
-    for folder in told.folders.values():
+    for folder in filter(None, told.folders.values()):
         console.line(f"recording   {folder}")
 
 
@@ -170,16 +175,3 @@ def _row(replayed: Replayed) -> list[str]:
     """A line of the table: numbers that belong together in one cell, so that it fits 80 columns."""
     cells = [" ".join(f"{console.number(replayed.scores[name]):>6}" for name in names) for names in _SHOWN]
     return [replayed.estimator, *cells, f"{replayed.ns_per_update:.0f}"]
-
-
-def _free_folder(into: Path, name: str) -> Path:
-    """A new folder, made here: no replay is written over another."""
-    i = 1
-    while True:
-        path = into / (name if i == 1 else f"{name}-{i}")
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
-            i += 1
-        else:
-            return path

@@ -10,6 +10,7 @@ from scenarios.harness import console, guard, viewing
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config
 from scenarios.harness.preflight import prepared
+from scenarios.harness.recorder import record
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
@@ -24,7 +25,7 @@ LATE_SHARE = 0.05  # of the updates; a few are late on any machine that has othe
 class Flown:
     """A flight that was flown, recorded and judged; `shown` live, or not.
 
-    flight, folder : None where the process that flew it is gone, and nothing of it is left
+    flight, folder : None where the process that flew it is gone, and nothing of it is left; `folder` too where it could not be written
     """
 
     scenario: Scenario
@@ -94,9 +95,7 @@ def fly(
     flight = replace(flight, manifest={**flight.manifest, "verdict": recording.plain(judged.rows)})  # for its story
     if live_view is not None:
         live_view.close(flight)
-    folder = recording.save(flight, _free_folder(into, scenario.name, config))
-    if rerun:
-        viewing.write_rerun(flight, folder)
+    folder = record(flight, into, _name(scenario.name, config), rerun=rerun)
     return Flown(scenario, flight, judged, folder, live_view)
 
 
@@ -126,21 +125,13 @@ def tell(flown: Flown) -> None:
         if event.level == "warn":
             console.line(f"{event.t_s - flight.release_s:8.1f} s  {event.text}", "yellow")
     console.print_known({judged.estimator: judged.known})
-    console.line(f"recording   {flown.folder}")
-    console.line(f"to see it   wingslevel view {flown.folder}")
+    if flown.folder is not None:
+        console.line(f"recording   {flown.folder}")
+        console.line(f"to see it   wingslevel view {flown.folder}")
     console.outcome(f"passed: {sum(row.passed for row in judged.rows)} of {len(judged.rows)} checks")
 
 
-def _free_folder(into: Path, scenario: str, config: FlightConfig) -> Path:
-    """A new folder, made here: no flight is ever written over another, whoever else is flying."""
+def _name(scenario: str, config: FlightConfig) -> str:
+    """Name of the folder of a recording."""
     estimator = config.estimator.rpartition(":")[2]
-    name = f"{scenario}-{estimator}-seed{config.seed}"
-    i = 1
-    while True:
-        path = into / (name if i == 1 else f"{name}-{i}")
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
-            i += 1
-        else:
-            return path
+    return f"{scenario}-{estimator}-seed{config.seed}"
