@@ -74,8 +74,9 @@ def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, cha
         raise ValueError(
             f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
         )
-    for name in wanted:
-        _, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
+    all_changes = changes if estimator is None else {**changes, "estimator": estimator}
+    configs = [prepared(name, all_changes)[1] for name in wanted]  # all of them, before anything is said
+    for name, config in zip(wanted, configs, strict=True):
         console.warn_of_faults(name, config)
     console.note_left_out(left_out)
     return [Task(name, seed, estimator, changes) for name in wanted for seed in seeds]
