@@ -75,9 +75,10 @@ def tasks(
         raise ValueError(
             f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
         )
+    all_changes = changes if estimator is None else {**changes, "estimator": estimator}
+    configs = [prepared(name, all_changes) for name in wanted]  # all of them, before anything is said
     found = []
-    for name in wanted:
-        scenario, config = prepared(name, changes if estimator is None else {**changes, "estimator": estimator})
+    for name, (scenario, config) in zip(wanted, configs, strict=True):
         console.warn_of_faults(name, config)
         decides = decided_by(name, config) | {"changes": recording.plain(changes)} if keyed else {}
         for seed in seeds:

@@ -25,7 +25,8 @@ LATE_SHARE = 0.05  # of the updates; a few are late on any machine that has othe
 class Flown:
     """A flight that was flown, recorded and judged; `shown` live, or not.
 
-    flight, folder : None where the process that flew it is gone, and nothing of it is left; `folder` too where it could not be written
+    flight, folder : None where the process that flew it is gone, and nothing of it is left;
+    `folder` too where it could not be written
     """
 
     scenario: Scenario

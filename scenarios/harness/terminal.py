@@ -18,6 +18,7 @@ from sim.wording import escaped, printable
 
 LEAST = 20  # columns that a terminal is taken to have at least; on fewer its own line breaks do
 _WIDE = 100_000
+_ASCII = box.Box(str(box.SIMPLE_HEAD).replace("\N{BOX DRAWINGS LIGHT HORIZONTAL}", "-"), ascii=True)
 
 
 class Terminal(Console):
@@ -64,6 +65,8 @@ class Grid(Table):
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """The heading, then the table, or its rows as lines."""
+        if options.ascii_only:
+            self.box = _ASCII
         if self.heading:
             yield _whole(self.heading, "bold")
         if self._narrowest(console, options) <= options.max_width:

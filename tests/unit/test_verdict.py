@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
@@ -12,7 +13,7 @@ from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.metrics import Measured
 from scenarios.harness.scenario import Scenario
-from scenarios.harness.verdict import Verdict, judge
+from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Flight, Log, Outcome, Phase
 
 
@@ -133,3 +134,94 @@ def test_markdown_shows_failed_flights_with_their_numbers():
     assert "| tilt RMS | 7 deg | <= 6 deg | **FAIL** |" in text
     assert "### seed 1 flight 0: ground_contact" in text
     assert "### seed 0" not in text
+
+
+def died(seed, estimator="premerlani"):
+    """A flight of which nothing is left."""
+    return FlightVerdict("level", estimator, seed, Outcome.WORKER_DIED, (), {}, "killed by signal 9")
+
+
+def verdict_with_dead(*seeds):
+    """Flights of 3 degrees on seeds 0 and 1, and those of `seeds` that died."""
+    scenario = scenario_of()
+    judged = [judge(scenario, flown(3.0, seed)) for seed in (0, 1)]
+    return Verdict.of((scenario, flight) for flight in [*judged, *map(died, seeds)])
+
+
+def test_flight_without_rows_is_missing_from_the_pool_and_fails_it():
+    """The checks are taken over the flights that are there, which does not make them passed."""
+    verdict = verdict_with_dead(2)
+    (pool,) = verdict.pooled
+    assert not verdict.passed
+    assert not pool.passed
+    assert pool.n_flights == 3
+    survived, tilt = pool.rows
+    assert (survived.measured, survived.limit, survived.passed) == (2, 3, False)
+    assert tilt.measured == pytest.approx(3.0, rel=1e-15)
+    assert {row.note for row in pool.rows} == {"1 of 3 flights missing"}
+    assert not any(row.passed for row in pool.rows)
+
+
+def test_flight_without_rows_is_one_line_of_markdown_and_one_error():
+    """A process that died says so once."""
+    verdict = verdict_with_dead(2)
+    text = verdict.to_markdown()
+    assert text.count("worker_died: killed by signal 9") == 1
+    assert text.rstrip().endswith("### seed 2 flight 0: worker_died: killed by signal 9")
+    (suite,) = ElementTree.fromstring(verdict.to_junit()).findall("testsuite")
+    assert (suite.get("tests"), suite.get("errors"), suite.get("failures"), suite.get("skipped")) == (
+        "7",
+        "1",
+        "0",
+        "2",
+    )
+    (error,) = suite.findall("testcase/error")
+    assert error.get("type") == "worker_died"
+    json.loads(verdict.to_json_text())
+
+
+def test_flights_that_all_died_are_a_verdict_too():
+    """Nothing to pool, nothing measured."""
+    scenario = scenario_of()
+    verdict = Verdict.of((scenario, died(seed)) for seed in range(2))
+    assert verdict.exit_code == 1
+    assert [row.note for row in verdict.pooled[0].rows] == ["2 of 2 flights missing"] * 2
+    assert ElementTree.fromstring(verdict.to_junit()).get("errors") == "2"
+    assert json.loads(verdict.to_json_text())["pooled"][0]["checks"][1]["measured"] is None
+    assert verdict.to_markdown().count("| not measured (2 of 2 flights missing) |") == 1
+
+
+@pytest.mark.parametrize(
+    "outcome",
+    [Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.TIMED_OUT, Outcome.DIVERGED, Outcome.INTERRUPTED],
+)
+def test_junit_flight_that_ended_in_an_error_is_one_error_and_no_failure(outcome):
+    """Its checks say nothing that the error does not say."""
+    root = ElementTree.fromstring(verdict_of(flown(9.0, outcome=outcome, message="Mine: why")).to_junit())
+    assert (root.get("errors"), root.get("failures")) == ("1", "0")
+    (error,) = root.findall("testsuite/testcase/error")
+    assert (error.get("type"), error.get("message")) == (str(outcome), f"{outcome.replace('_', ' ')}: Mine: why")
+
+
+def test_flight_that_ended_in_an_error_has_not_passed_whatever_was_measured():
+    """Half a flight within the limits is half a flight."""
+    tilt = Check("tilt", "deg", lambda f: Measured(1.0), 4.0)
+    scenario = replace(scenario_of(), checks=(tilt,))
+    verdict = verdict_of(flown(1.0, outcome=Outcome.TIMED_OUT), scenario=scenario)
+    assert verdict.flights[0].rows[0].passed
+    assert verdict.exit_code == 1
+
+
+def test_junit_times_of_the_cases_add_up_to_those_of_the_flights():
+    """The time of a flight is that of its first case; the result is the same with it and without."""
+    scenario = scenario_of()
+    judged = [judge(scenario, flown(3.0, seed)) for seed in (0, 1)]
+    timed = [replace(flight, wall_s=wall_s) for flight, wall_s in zip(judged, (1.25, 2.5), strict=True)]
+    with_times, without = (Verdict.of((scenario, flight) for flight in flights) for flights in (timed, judged))
+    root = ElementTree.fromstring(with_times.to_junit())
+    cases = [float(case.get("time")) for case in root.iter("testcase")]
+    assert cases == [1.25, 0.0, 2.5, 0.0, 0.0, 0.0]
+    assert root.get("time") == root.find("testsuite").get("time") == "3.750"
+    assert with_times == without
+    assert with_times.to_json_text() == without.to_json_text()
+    assert with_times.to_markdown() == without.to_markdown()
