@@ -12,14 +12,17 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.wording import described, printable
 
 LARGEST_FILE = 2 << 30  # bytes of a file that is read as a whole
 LARGEST_SETTING = 4 << 20  # of one that a person writes: a column map, a part, a sensor suite, a manifest
 GROWS, FREELY = 100, 64 << 20  # what is packed grows to so many times its size at most, or to so many bytes
+LARGEST_NUMBER = 1e100  # beyond it, or infinite, is no number: no sensor reads it, and its square overflows
 LONGEST_LINE = 1000  # characters of a message; names of columns are part of it
 _PIECE = 1 << 20
 _KINDS = (
@@ -105,7 +108,7 @@ def unpacked(path: Path, raw: bytes) -> bytes:
         if rest.strip(b"\0"):
             raise gzip.BadGzipFile("something that is not packed follows what is")
     except (zlib.error, EOFError, gzip.BadGzipFile) as error:
-        raise ValueError(f"{path}: cannot be unpacked: {error}") from None
+        raise ValueError(f"{path}: cannot be read: {error}") from None
     return b"".join(parts)
 
 
@@ -139,6 +142,11 @@ def _told(path: Path | str, error: Exception) -> str:
     if isinstance(error, OSError):
         return f"{path}: cannot be read: {_reason(error)}"
     return f"{path}: cannot be read: {said or described(error)}"
+
+
+def measured(values: NDArray[Any]) -> NDArray[Any]:
+    """`values` with NaN for what no instrument reads: infinite, or beyond `LARGEST_NUMBER`."""
+    return np.where(np.abs(values) < LARGEST_NUMBER, values, np.nan)
 
 
 def some(names: object, most: int = 40) -> str:

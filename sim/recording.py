@@ -28,12 +28,13 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from estimator.interface import Column
-from sim import drafts
+from sim import drafts, files, recording_checks
 from sim.log import TABLES, Event, Flight, Log, Outcome
 
 PARQUET = "flight.parquet"
 MANIFEST = "manifest.json"
 FORMAT = 1  # raised when the columns or the record change in a way that an older reader would misread
+LARGEST_MANIFEST = 64 << 20  # bytes
 _KEY = b"wingslevel"
 _OWN = ("format", "outcome", "message", "heading_reference", "dt_s", "release_s", "n_ticks", "events", "sha256")
 
@@ -182,16 +183,24 @@ def load(source: str | Path) -> Flight:
     path = Path(source)
     if path.is_dir():
         path = path / PARQUET
+    with files.reading(path, RecordingError):
+        files.check(path, "recording")
+        return _load(path)
+
+
+def _load(path: Path) -> Flight:
     try:
-        table = pq.read_table(path)
-    except FileNotFoundError as error:
-        raise RecordingError(f"no recording at {path}: there is no such file") from error
+        file = pq.ParquetFile(path, memory_map=False)
     except (OSError, pa.ArrowException) as error:
         raise RecordingError(f"cannot read {path}: truncated, or not a Parquet file ({_first_line(error)})") from error
-    record = _record_of(table.schema, path)
-    _check_sha256(path)
+    with file:
+        record = _record_of(file.schema_arrow, path)
+        _check_sha256(path)
+        log = _log_of(file, path)
+    if record["n_ticks"] != len(log):
+        raise RecordingError(f"{path}: {len(log)} rows, but its record says {record['n_ticks']} ticks")
     return Flight(
-        log=_log_of(table, path),
+        log=log,
         dt_s=record["dt_s"],
         release_s=record["release_s"],
         outcome=Outcome(record["outcome"]),
@@ -256,20 +265,24 @@ def _record_of(schema: pa.Schema, path: Path) -> dict[str, Any]:
     stored = (schema.metadata or {}).get(_KEY)
     if stored is None:
         raise RecordingError(f"{path} is a Parquet file, but not a flight: it carries no record of wingslevel")
-    record = json.loads(stored)
-    if record["format"] != FORMAT:
-        raise RecordingError(f"{path} has recording format {record['format']}; this version reads {FORMAT}")
-    return record
+    return recording_checks.record(json.loads(stored), (FORMAT,))
 
 
-def _log_of(table: pa.Table, path: Path) -> Log:
-    expected, found = [e.name for e in elements()], table.column_names
+def _log_of(file: pq.ParquetFile, path: Path) -> Log:
+    """The columns of the file, each of which is checked; those of the time first, as they are told first."""
+    expected, found, rows = [e.name for e in elements()], file.schema_arrow.names, file.metadata.num_rows
     if odd := sorted(set(expected) ^ set(found)):
         kind = "lacks" if odd[0] in expected else "has the unknown"
-        raise RecordingError(f"{path} was recorded by another version: it {kind} column {odd[0]}")
-    log = Log.empty(table.num_rows)
+        raise RecordingError(f"{path} was recorded by another version: it {kind} column {files.some(odd[:1])}")
+    if len(found) > len(expected):
+        raise RecordingError(f"{path}: it has a column twice")
+    recording_checks.schema(file.schema_arrow, {e.name: e.column.integer for e in elements()}, rows)
+    recording_checks.column("truth.t_s", file.read(columns=["truth.t_s"])["truth.t_s"], rows)
+    table, log = file.read(), Log.empty(rows)
     for e in elements():
-        getattr(log, e.table)[e.column.name][(slice(None), *e.at)] = table[e.name].to_numpy()
+        getattr(log, e.table)[e.column.name][(slice(None), *e.at)] = recording_checks.column(
+            e.name, table[e.name], rows
+        )
     return log
 
 
@@ -278,8 +291,8 @@ def _check_sha256(path: Path) -> None:
     if path.name != PARQUET or not manifest.exists():
         return
     try:
-        promised = json.loads(manifest.read_text(encoding="utf-8"))["sha256"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        promised = json.loads(files.read(manifest, "manifest", LARGEST_MANIFEST).decode("utf-8"))["sha256"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise RecordingError(f"cannot read {manifest}: not a manifest of a flight ({_first_line(error)})") from error
     if promised != _sha256(path):
         raise RecordingError(f"{path} is not the file that {MANIFEST} beside it describes: its SHA-256 differs")

@@ -10,6 +10,7 @@ from typing import Any
 
 from scenarios.harness import console, export_text
 from scenarios.harness.fitted import suite_params
+from sim import files as strangers
 from sim import gps_messages, recording
 from sim.gps_messages import Accuracy, Fixes
 from sim.log import Flight
@@ -83,7 +84,8 @@ def make(
             raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: each needs a file of its own")
         named[path.resolve()] = option
     flight = recording.load(source.parent if source.suffix == ".rrd" else source)
-    fixes = Fixes.from_log(flight.log.measured, accuracy_of(flight))
+    with strangers.reading(source):
+        fixes = Fixes.from_log(flight.log.measured, accuracy_of(flight))
     if len(fixes) == 0 and (nmea is not None or ubx is not None):
         raise ValueError(f"no GPS fix arrived in {source}: nothing to export")
     encoders: dict[str, tuple[Path | None, Callable[..., bytes]]] = {
@@ -116,7 +118,9 @@ def accuracy_of(flight: Flight) -> Accuracy:
     config = flight.manifest.get("config")
     if config is None:
         return Accuracy()
-    gps = suite_params(config["suite"], config["sensors"], config.get("files", {})).gps
+    if not isinstance(config.get("suite"), str):
+        raise ValueError("its config names no sensor suite")
+    gps = suite_params(config["suite"], config.get("sensors") or {}, config.get("files") or {}).gps
     both_axes_m = math.sqrt(2.0) * math.hypot(gps.wander_horizontal_m, gps.noise_horizontal_m)
     vertical_m = math.hypot(gps.wander_vertical_m, gps.noise_vertical_m)
     return Accuracy(both_axes_m, vertical_m, math.hypot(gps.velocity_noise_m_s, gps.velocity_wander_m_s))

@@ -218,7 +218,7 @@ def test_object_of_matlab_is_refused_with_what_to_save(tmp_path, monkeypatch):
     from scenarios.harness.logs import matlab
 
     opaque = MatlabOpaque(np.zeros(1, dtype=[("s0", "O"), ("arr", "O")]))
-    monkeypatch.setattr(matlab, "loadmat", lambda *_args, **_options: {"T": opaque})
+    monkeypatch.setattr(matlab.sandbox, "call", lambda *_args, **_options: {"T": opaque})
     (tmp_path / "log.mat").write_bytes(b"MATLAB 5.0")
     with pytest.raises(LogError, match=r"T holds objects of MATLAB.*table2struct\(T, 'ToScalar', true\)"):
         logs.read(tmp_path / "log.mat")

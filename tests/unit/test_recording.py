@@ -17,14 +17,19 @@ from sim.recording import MANIFEST, PARQUET, RecordingError, check_writable, dig
 
 
 def a_flight(n_ticks=40, seed=0):
-    """A flight whose every element is a different number, some of them NaN, infinite or negative zero."""
+    """A flight whose every element is a different number, some of them NaN, infinite or negative zero.
+
+    Times increase, flags and enumerations hold what they may.
+    """
     rng = np.random.default_rng(seed)
     log = Log.empty(n_ticks)
     for table, columns in TABLES.items():
         rows = getattr(log, table)
         for column in columns:
             shape = (n_ticks, *column.shape)
-            rows[column.name] = rng.integers(-9, 9, shape) if column.integer else rng.standard_normal(shape)
+            rows[column.name] = rng.integers(0, 2, shape) if column.integer else rng.standard_normal(shape)
+            if column.name == "t_s":
+                rows["t_s"] = 0.02 * np.arange(1, n_ticks + 1) + 1e-3 * np.abs(rows["t_s"]).clip(0.0, 9.0)
     if n_ticks > 3:
         log.truth["p_e_m"][:4, 1] = np.nan, np.inf, -0.0, 5e-324
     return Flight(

@@ -1,6 +1,7 @@
 """Recorded logs from anywhere, read into the rows that estimators take.
 
-One module per format; each has ``read(path, ...) -> RecordedLog``.  `read` picks the module by the file.
+One module per format; each has ``read(path, ...) -> RecordedLog``.  `read` picks the module by the file.  It is also
+the border to files of strangers: whatever a reader raises becomes a `LogError` of one line here, see `sim.files`.
 """
 
 from dataclasses import replace
@@ -12,6 +13,8 @@ import numpy as np
 from scenarios.harness.logs import accounts, checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
 from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog
+from sim import files
+from sim.wording import printable
 
 _BY_MAP = {  # columns of numbers, which a column map explains
     **dict.fromkeys((".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz"), "text"),
@@ -40,20 +43,33 @@ def read(
     ------
     LogError      one line: a file that is not there, of an unknown kind, or that cannot be believed
     """
-    if not path.exists():
-        raise LogError(f"no log at {path}: there is no such file")
-    if columns is None and vectors.is_reference(path):
-        return checks.mended(vectors.read(path, reference), path)
-    log = _read(path, None if columns is None else column_map.load(columns), imu)
-    return log if reference is None else _against(log, reference)
+    with files.reading(path, LogError):
+        if not path.is_dir():
+            files.check(path, "log")
+        if reference is not None and not reference.is_dir():
+            files.check(reference, "reference")
+        if columns is None and vectors.is_reference(path):
+            return _printable(checks.mended(vectors.read(path, reference), path))
+        log = _read(path, None if columns is None else column_map.load(columns), imu)
+        if reference is not None:
+            with files.reading(reference, LogError):
+                log = _against(log, reference)
+    return _printable(log)
+
+
+def _printable(log: RecordedLog) -> RecordedLog:
+    """`log` with what it says in words of the file, its name and those of its columns, fit for a terminal."""
+    reference = log.reference and replace(log.reference, name=printable(log.reference.name))
+    repairs, notes = (
+        tuple(printable(line, files.LONGEST_LINE) for line in lines) for lines in (log.repairs, log.notes)
+    )
+    return replace(log, name=printable(log.name), repairs=repairs, notes=notes, reference=reference)
 
 
 def _against(log: RecordedLog, path: Path) -> RecordedLog:
     """`log` with the attitudes of the file at `path` at the times of its rows."""
     from scenarios.harness.logs import reference_file
 
-    if not path.exists():
-        raise LogError(f"no reference at {path}: there is no such file")
     rows_s, ledger, repairs = log.rows["t_s"], accounts.without(log.ledger, "reference"), list(log.repairs)
     reader = _module(path.name.lower(), _BY_MAP)
     kind: reference_file.Kind = "filter"
@@ -91,7 +107,7 @@ def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) ->
         return import_module(f"{__name__}.{autopilot}").read(path, imu)
     if path.is_dir() or name.endswith(".parquet"):
         return checks.mended(import_module(f"{__name__}.ours").read(path), path)
-    found = foreign.hint(path.read_bytes()[: foreign.ENOUGH])
+    found = foreign.hint(files.head(path, foreign.ENOUGH))
     raise LogError(f"{path}: this is {found}" if found else f"{path}: unknown kind of log; {KINDS}")
 
 

@@ -36,10 +36,8 @@ def attitude(table: Mapping[str, Array]) -> Array | None:
     values = np.column_stack([table[name] for name in names])
     values = np.where(np.isinf(values), np.nan, values)
     if names == MATRIX:
-        R_eb = values.reshape(-1, 3, 3)
-        known = np.abs(R_eb @ R_eb.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < 0.1
-        known &= np.linalg.det(np.where(known[:, None, None], R_eb, np.eye(3))) > 0.0
-    elif names == QUATERNION:
+        return rotations(values.reshape(-1, 3, 3))
+    if names == QUATERNION:
         known = np.asarray(np.abs(np.linalg.norm(values, axis=1) - 1.0) < 0.1)
         R_eb = np.full((len(known), 3, 3), np.nan)
         if known.any():
@@ -47,6 +45,14 @@ def attitude(table: Mapping[str, Array]) -> Array | None:
     else:
         known = np.isfinite(values).all(axis=1) & np.maximum.accumulate(np.any(np.nan_to_num(values) != 0.0, axis=1))
         R_eb = from_euler(*values.T)
+    return np.where(known[:, None, None], R_eb, np.nan)
+
+
+def rotations(R_eb: Array) -> Array:
+    """Matrices of shape (N, 3, 3), NaN where one is no rotation."""
+    small = np.where(np.abs(R_eb) < 2.0, R_eb, np.nan)  # the square of what is larger may overflow
+    known = np.abs(small @ small.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < 0.1
+    known &= np.linalg.det(np.where(known[:, None, None], small, np.eye(3))) > 0.0
     return np.where(known[:, None, None], R_eb, np.nan)
 
 

@@ -26,6 +26,7 @@ from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.witnesses import witnesses
 
 LATEST_S = 1.0  # a row later than this is not late: the clock was set, or two logs are in one file
+LONGEST_LOG_S = 5e9  # longer than any clock runs; a timeline in nanoseconds holds no more
 FASTEST_HZ = 20_000.0
 BUSIEST_RAD_S = 3.0  # no aeroplane turns faster for half of a log
 FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
@@ -134,6 +135,9 @@ def kept(
     for k in np.flatnonzero(behind_s > LATEST_S)[:1]:
         why = f"runs back from {latest_s[k]:g} to {t_s[keep[k]]:g} s: a clock that was set, or two logs in one"
         raise source.refusal(int(keep[k]), "time", why)
+    for k in np.flatnonzero(latest_s - t_s[keep[0]] > LONGEST_LOG_S)[:1]:
+        why = f"{t_s[keep[k]]:g} s, after a log that begins at {t_s[keep[0]]:g} s: a damaged time"
+        raise source.refusal(int(keep[k]), "time", why)
     late = np.flatnonzero(np.diff(t_s[keep]) < 0.0)
     if len(late):
         first_row = source.row(int(keep[late[0] + 1]))
@@ -214,7 +218,7 @@ def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> N
         why = f"{usual:g} s from row to row; an inertial unit samples every {1.0 / FASTEST_HZ:g} to {LONGEST_GAP_S} s"
         raise source.refusal(None, "time", why)
     steps = np.concatenate(([usual], steps))
-    unknown = ~(rows["dt_s"] > 0.0)
+    unknown = ~((rows["dt_s"] > 0.0) & (rows["dt_s"] <= LONGEST_GAP_S))
     rows["dt_s"][unknown] = np.where(steps > LONGEST_GAP_S, usual, steps)[unknown]
     expected = np.where(unknown, usual, rows["dt_s"])
     short = gaps.missing(rows["t_s"], expected) & (steps <= LONGEST_GAP_S)

@@ -27,6 +27,7 @@ table ``[columns]`` the columns are recognised by their names, as they are witho
 """
 
 import math
+import os
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -43,6 +44,7 @@ from scenarios.harness.logs.quantities import QUANTITIES, Meaning
 from scenarios.harness.logs.recorded import LogError
 from scenarios.harness.logs.units import UNITS
 from scenarios.harness.plugins import near_misses
+from sim import files
 
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
 Kind = Literal["truth", "filter", "firmware"]
@@ -106,12 +108,17 @@ def load(spec: str | Path) -> ColumnMap:
     path = Path(spec)
     if path.suffix != ".toml":
         path = MAPS / f"{spec}.toml"
-    if not path.is_file():
+    if not os.path.lexists(path):
         offered = sorted(p.stem for p in MAPS.glob("*.toml"))
         raise LogError(f"no column map {str(spec)!r}: {near_misses(str(spec), offered)} (your own: a file.toml)")
+    with files.reading(path, LogError):
+        return _loaded(path)
+
+
+def _loaded(path: Path) -> ColumnMap:
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        data = tomllib.loads(files.text(path, "column map"))
+    except tomllib.TOMLDecodeError as error:
         raise LogError(f"{path}: {' '.join(str(error).split())}") from error
     for key in data:
         if key not in _KEYS:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from estimator.interface import Array
 from scenarios.harness.logs import foreign
 from scenarios.harness.logs.recorded import LogError
+from sim import files
 
 HEADER, FMT, FMT_LENGTH = b"\xa3\x95", 128, 89
 _DEG = np.pi / 180.0
@@ -80,10 +81,7 @@ class DataFlash:
             raise LogError(f'{path}: logs of ArduPilot need pymavlink: pip install "wingslevel[logs]"') from error
         self.path, self.repairs = path, list[str]()
         self._codes: dict[str, tuple[str, float | None, Any]] = FORMAT_TO_STRUCT
-        try:
-            self._raw = path.read_bytes()
-        except OSError as error:
-            raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+        self._raw = files.read(path, "DataFlash log")
         foreign.refuse(path, self._raw, "an ArduPilot DataFlash log (.bin)")
         self._formats: dict[int, _Format] = {}
         self._offsets = self._walk()

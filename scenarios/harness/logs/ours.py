@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.instruments import Known
-from estimator.interface import ImuSample
-from scenarios.harness.logs import properties
+from estimator.interface import Array, ImuSample
+from scenarios.harness.logs import attitudes, properties
+from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
-from sim import recording
+from sim import files, recording
 from sim.log import Flight
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
 from sim.story import setting
@@ -29,28 +30,49 @@ def read(path: Path) -> RecordedLog:
         raise LogError(str(error)) from error
     if not len(flight.log):
         raise LogError(f"{path}: a flight without a tick")
-    rows = flight.log.measured
+    rows = _measured_of(flight)
     air = (rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])
     has = {"gps": rows["gps_new"], "magnetometer": rows["mag_new"], "airspeed": air}
     instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
-    reference = Reference(flight.log.truth["R_eb"], "truth", "the true attitude")
+    ledger = Ledger()
+    reference = Reference(_true(flight.log.truth["R_eb"], ledger), "truth", "the true attitude")
     name = path.name if path.is_dir() else path.parent.name
     known = known_of(flight) if "known" in flight.manifest else _measured(rows)  # in replay what was known in flight
     known |= calibration_of(flight)
     return RecordedLog(
-        rows, name or path.name, instruments, reference, (), place_of(flight), known, on_ground=on_ground_of(flight)
-    )
+        rows, name or path.name, instruments, reference, (), place_of(flight), known, ledger,
+        on_ground=on_ground_of(flight),
+    )  # fmt: skip
+
+
+def _measured_of(flight: Flight) -> NDArray[Any]:
+    """The measured rows, without numbers that no instrument reads."""
+    rows = flight.log.measured.copy()
+    for name in rows.dtype.names or ():
+        if rows.dtype[name].base.kind == "f":
+            rows[name] = files.measured(rows[name])
+    return rows
+
+
+def _true(R_eb: Array, ledger: Ledger) -> Array:
+    """The attitude, NaN where it is no rotation: those are entered in the ledger, the others when they are used."""
+    found = attitudes.rotations(R_eb)
+    lost = int(np.sum(~np.isfinite(found).all(axis=(1, 2))))
+    if lost:
+        ledger.read("reference", len(R_eb))
+        ledger.leave_out("reference", lost, attitudes.NO_ROTATION)
+    return found
 
 
 def known_of(flight: Flight) -> dict[str, Known]:
     """What the manifest of a flight says of the instruments aboard."""
-    known = flight.manifest.get("known", {})
+    known = flight.manifest.get("known") or {}
     return {name: Known.from_json(entry) for name, entry in known.items()}
 
 
 def calibration_of(flight: Flight) -> dict[str, Known]:
     """The calibration of the magnetometer that an estimator was given, by the names of its parameters."""
-    given = flight.manifest.get("config", {}).get("estimator_params", {})
+    given = (flight.manifest.get("config") or {}).get("estimator_params") or {}
     return {n: Known(v, "log", "calibration in flight") for n, v in given.items() if n.startswith("calibration.")}
 
 

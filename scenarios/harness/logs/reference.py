@@ -10,7 +10,6 @@ names of the files, and goes to the estimators that have such a parameter (`Reco
 """
 
 import csv
-import gzip
 import io
 import math
 from pathlib import Path
@@ -24,7 +23,9 @@ from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs import accounts, properties
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.text_table import LARGEST
 from scenarios.harness.logs.validity import usable
+from sim import files
 
 COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
 LEAST_FIX = 3  # a fix of three dimensions
@@ -122,11 +123,10 @@ def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | No
 
 def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
     """Columns of a file of comma-separated numbers, packed or not."""
-    try:
-        raw = path.read_bytes()
-        text = (gzip.decompress(raw) if path.suffix == ".gz" else raw).decode()
-    except (OSError, EOFError, UnicodeDecodeError) as error:
-        raise LogError(f"{path}: cannot be read: {error}") from error
+    raw = files.unpacked(path, files.read(path, "table of reference vectors", LARGEST))
+    if len(raw) > LARGEST:
+        raise LogError(f"{path}: {files.size(len(raw))} of text, more than the {files.size(LARGEST)} that can be read")
+    text = raw.decode()
     lines = csv.reader(io.StringIO(text))
     header = next(lines, [])
     missing = [name for name in wanted if name not in header]
@@ -140,7 +140,7 @@ def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
         rows.append([_number(cell, where, name) for name, cell in zip(header, line, strict=True)])
     if not rows:
         raise LogError(f"{path}: no row of numbers")
-    values = np.array(rows)
+    values = files.measured(np.array(rows))
     return {name: values[:, header.index(name)] for name in wanted}
 
 

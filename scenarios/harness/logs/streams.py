@@ -24,6 +24,7 @@ from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.validity import usable
+from sim import files
 
 Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
 SLOWEST_S = 0.1  # an inertial unit logged more slowly is not to be integrated
@@ -57,8 +58,8 @@ class Stream:
 
     @classmethod
     def of(cls, name: str, t_s: Array, values: Array) -> "Stream":
-        """Messages all of which may be used."""
-        return cls(name, t_s, values, np.full(len(t_s), "", object))
+        """Messages all of which may be used; numbers that no instrument reads are none, see `files.measured`."""
+        return cls(name, files.measured(t_s), files.measured(values), np.full(len(t_s), "", object))
 
     def without(self, where: NDArray[np.bool_], reason: str) -> "Stream":
         """The same, without those messages `where`, unless there was a reason before."""

@@ -25,10 +25,10 @@ from scenarios.harness.logs.quantities import EULER, FIELD, INERTIAL
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.units import COUNTS
 from scenarios.harness.logs.validity import usable
+from sim import files
 
 Table = dict[str, Array]
 CLIMB_M = 5.0  # a receiver whose height changes by more than this, at no vertical velocity, does not report one
-LARGEST = 1e100  # a number beyond this, or an infinite one, is none: no sensor reads it, and its square overflows
 FEWEST_FORCES = 5  # samples of the gyro for one of the accelerometer, at most
 REMEDY = (
     "where the axes are forward, left, up: --columns forward-left-up; right, forward, up: --columns right-forward-up; "
@@ -88,7 +88,7 @@ def take(
     told: dict[tuple[str, int], set[str]] = {}
     own: dict[str, str] = {}
     for name, m in meanings.columns.items():
-        values = np.where(np.abs(columns[name]) < LARGEST, columns[name], np.nan)
+        values = files.measured(columns[name])
         part = (of(name), len(values))
         table = parts.setdefault(part, {})
         if m.quantity in table:

@@ -9,7 +9,6 @@ What can be read in two ways is refused, with the entry of a column map that dec
 """
 
 import csv
-import gzip
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -22,12 +21,15 @@ from estimator.interface import Array
 from scenarios.harness.logs import foreign, units
 from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.recorded import LogError
+from sim import files
 
 DELIMITERS = (";", "\t", ",", "|")
 REMARKS = ("#", "%", "//")
 NOTHING = frozenset(
     ("", "nan", "null", "-", "--", "na", "n/a", "none", "#n/a", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan")
 )
+LARGEST = 512 << 20  # bytes of text
+MOST_LINES, MOST_CELLS, MOST_COLUMNS = 10_000_000, 40_000_000, 10_000
 _SAMPLE = 50  # lines that are looked at
 _DAY_S = 86400.0
 _NO_TIME = "is no number, no time of day (12:34:56.78) and no date (2026-07-02T12:34:56.78)"
@@ -59,7 +61,10 @@ def read(path: Path, how: ColumnMap) -> TextTable:
     ------
     LogError      one line with the file, the line and the column
     """
-    lines = re.split(r"\r\n|\n|\r", _text(path))
+    text = _text(path)
+    if max(text.count("\n"), text.count("\r")) > MOST_LINES:
+        raise LogError(f"{path}: more than the {MOST_LINES} lines that can be read: divide the log")
+    lines = re.split(r"\r\n|\n|\r", text)
     at = [i for i in range(how.skip_lines, len(lines)) if lines[i].strip()]
     remarks = [i for i in at if lines[i].lstrip().startswith(REMARKS)]
     remark = set(remarks)
@@ -103,22 +108,19 @@ def read(path: Path, how: ColumnMap) -> TextTable:
 
 def _text(path: Path) -> str:
     """The text of a file, packed or not."""
+    raw = files.unpacked(path, files.read(path, "text log", LARGEST))
+    if len(raw) > LARGEST:
+        raise LogError(f"{path}: {files.size(len(raw))} of text, more than the {files.size(LARGEST)} that can be read")
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16")
+    if found := foreign.hint(raw):
+        raise LogError(f"{path}: not text in columns; this is {found}")
+    if b"\0" in raw[:1000]:
+        raise LogError(f"{path}: cannot be read as text: there are zero bytes in it")
     try:
-        raw = path.read_bytes()
-        if raw[:2] == b"\x1f\x8b":
-            raw = gzip.decompress(raw)
-        if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            return raw.decode("utf-16")
-        if found := foreign.hint(raw):
-            raise LogError(f"{path}: not text in columns; this is {found}")
-        if b"\0" in raw[:1000]:
-            raise LogError(f"{path}: cannot be read as text: there are zero bytes in it")
-        try:
-            return raw.decode("utf-8-sig")
-        except UnicodeDecodeError:
-            return raw.decode("latin-1")
-    except (OSError, EOFError, UnicodeDecodeError, gzip.zlib.error) as error:  # type: ignore[attr-defined]
-        raise LogError(f"{path}: cannot be read: {error}") from error
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
 
 
 def _delimiter(path: Path, lines: Sequence[str]) -> str:
@@ -140,6 +142,11 @@ def _delimiter(path: Path, lines: Sequence[str]) -> str:
 def _cells(path: Path, lines: Sequence[str], delimiter: str) -> list[list[str]]:
     if delimiter == " ":
         lines = [re.sub(r"[ \t]+", " ", line.strip()) for line in lines]
+    if (most := sum(line.count(delimiter) + 1 for line in lines)) > MOST_CELLS:
+        raise LogError(f"{path}: {most} cells, more than the {MOST_CELLS} that can be read: divide the log")
+    if (widest := max((line.count(delimiter) + 1 for line in lines), default=0)) > MOST_COLUMNS:
+        raise LogError(f"{path}: {widest} cells in a line, more than the {MOST_COLUMNS} columns that can be read")
+    csv.field_size_limit(LARGEST)  # a cell may be long: what is in it is told, and not that it is
     cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=delimiter)]
     if len(cells) != len(lines):
         raise LogError(f"{path}: a quotation mark that opens and does not close")

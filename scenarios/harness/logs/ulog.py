@@ -25,6 +25,7 @@ from scenarios.harness.logs.ardupilot import FLYING_M_S
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Kind, Stream
 from scenarios.harness.logs.ulog_bytes import whole
+from sim import files
 
 ATTITUDES: tuple[tuple[str, Kind], ...] = (
     ("vehicle_attitude_groundtruth", "truth"), ("vehicle_attitude", "filter"),
@@ -76,15 +77,13 @@ class _Log:
             raise LogError(f'{path}: logs of PX4 need pyulog: pip install "wingslevel[logs]"') from error
         self.path = path
         try:
-            raw = path.read_bytes()
+            raw = files.read(path, "ULog file")
             foreign.refuse(path, raw, "a ULog file of PX4 (.ulg)")
             clean = whole(path, raw, repairs)
             with contextlib.redirect_stdout(io.StringIO()):  # it prints what it found damaged
                 self._log = ULog(io.BytesIO(clean), TOPICS)
         except LogError:
             raise
-        except OSError as error:
-            raise LogError(f"{path}: cannot be read: {error.strerror}") from error
         except Exception as error:  # pyulog raises whatever its parser meets in a file that is none or damaged
             raise LogError(f"{path}: cannot be read as a ULog file: {' '.join(str(error).split())}") from error
         self.topics: dict[tuple[str, int], Topic] = {}
