@@ -19,7 +19,7 @@ from autopilot.interface import NEUTRAL, Autopilot, Mode, Setpoint
 from autopilot.pilot import Script, Timed
 from estimator.instruments import Instruments
 from estimator.interface import AttitudeEstimator, Measurements
-from scenarios.harness import console
+from scenarios.harness import console, guard
 from scenarios.harness.checks import Row
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
@@ -108,6 +108,9 @@ class NotTimed(RuntimeError):
     def __init__(self, why: str, exit_code: int = FAILED) -> None:
         super().__init__(why)
         self.exit_code = exit_code
+
+
+_BENCHMARK = "the benchmark"
 
 
 class Cruise:
@@ -228,8 +231,12 @@ def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int
     ------
     ValueError      no such estimator      NotTimed    one that fails, or does not keep the aeroplane in the air
     """
+    equipped(estimator)  # refused before anything is timed
+    if _BENCHMARK in guard.lost:
+        raise NotTimed(f"the benchmark's flight did not last: the process {guard.lost[_BENCHMARK].message}")
     try:
-        return _measured(estimator, seconds, repeats, advance)
+        with guard.watched(_BENCHMARK):
+            return _measured(estimator, seconds, repeats, advance)
     except FlightCodeFailed as failure:
         raise NotTimed(str(failure)) from failure
 

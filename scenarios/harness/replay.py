@@ -180,6 +180,12 @@ def replay(
     )
 
 
+def gone(spec: str, failure: str) -> Replayed:
+    """What there is of an estimator that took the process with it: no row, and why."""
+    scores = dict.fromkeys(SCORES, math.nan)
+    return Replayed(spec.rpartition(":")[2], "course", Log.empty(0), 0, math.nan, None, scores, failure)
+
+
 def known_to(log: RecordedLog, withheld: Sequence[str] = ()) -> Instruments:
     """What an estimator is given of the instruments of `log`; where all is withheld, no calibration either."""
     unknown = _all_of(withheld)  # nor is it given what was measured before the log

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from estimator.instruments import Instruments, property_names, to_json
-from scenarios.harness import console, logs
+from scenarios.harness import console, guard, logs
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.plugins import shared_settings, without
 from scenarios.harness.recorder import record
-from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, known_to, make, replay, why_none
+from scenarios.harness.replay import Replayed, Window, as_flight, gone, judged_rows, known_to, make, replay, why_none
 from sim import recording
 
 _HEADINGS = ("", "inclination\n   RMS    p95    max", "heading\nRMS", "rotation\n   RMS    max", "ns per\nupdate")
@@ -105,10 +105,17 @@ def run(
     replays: list[Replayed] = []
     folders: dict[str, Path | None] = {}
     for name in names:
-        with console.progress(f"replaying {name}", "") as advance:
+        watched = f"estimator {name}"
+        if watched in guard.lost:  # and with it the process in which all are replayed
+            replays.append(gone(name, f"the process {guard.lost[watched].message}"))
+            continue
+        with console.progress(f"replaying {name}", "") as advance, guard.watched(watched):
             replays.append(replay(log, name, of_each[name], window, withheld, advance))
     stem = log.name.partition(".")[0]
     for replayed in replays:
+        if not len(replayed.log):
+            folders[replayed.estimator] = None
+            continue
         flight = as_flight(log, replayed, window)
         with console.progress(f"recording {replayed.estimator}", "") as _:
             folder = record(flight, into, f"replay_{stem}-{replayed.estimator}", rerun=rerun)

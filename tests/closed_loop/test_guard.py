@@ -171,3 +171,23 @@ def test_check_that_is_cancelled_reports_what_was_finished(here: Path, number: i
     missing = f"{500 - len(verdict['flights'])} of 500 flights are missing"
     assert missing in (here / "v.md").read_text()
     assert missing in (here / "v.xml").read_text()
+
+
+def test_replay_estimator_that_ends_its_process_leaves_the_others_their_scores(here: Path) -> None:
+    """The log is replayed once more without it; it has failed, exit code 1."""
+    assert wingslevel(here, "fly", "crosswind", "--set", "duration_s=2", "--no-rerun").returncode in (0, 1)
+    names = "gyro_only,own.py:Leaves,accelerometer_only"
+    done = wingslevel(here, "replay", "flights/crosswind-premerlani-seed0", "--estimator", names, *QUICK[2:])
+    each = json.loads(done.stdout)["estimators"]
+    assert done.returncode == 1
+    assert each["Leaves"]["failure"] == "the process ended by itself (exit code 0)"
+    assert (each["Leaves"]["recording"], each["Leaves"]["inclination_rms_deg"]) == (None, None)
+    assert all(Path(here, each[name]["recording"]).is_dir() for name in ("gyro_only", "accelerometer_only"))
+    assert len(list((here / "flights").iterdir())) == 3
+
+
+def test_bench_estimator_that_ends_its_process_is_exit_code_1(here: Path) -> None:
+    """One line says so, and the JSON."""
+    done = wingslevel(here, "bench", "--estimator", "own.py:Leaves", "--seconds", "2", "--repeats", "3", "--json", "-")
+    assert done.returncode == 1
+    assert "ended by itself (exit code 0)" in json.loads(done.stdout)["failure"]
