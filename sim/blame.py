@@ -34,6 +34,11 @@ class Refused(ValueError):
     """Something that others' code gave and that cannot be used: ours, so that its text alone is the line."""
 
 
+def tracebacks_shown() -> bool:
+    """Whether this process was told to show whole tracebacks."""
+    return _Switch.on
+
+
 class _Switch:
     """Whether this process shows whole tracebacks."""
 
@@ -76,7 +81,7 @@ class theirs:
 
 def told(error: BaseException, home: str = "") -> str:
     """What others' code raised, on one line with its place; shows the traceback where that is wanted."""
-    _show(error)
+    show_traceback(error)
     if issubclass(type(error), Refused):
         return printable(str(error))
     place = place_of(error, home)
@@ -130,7 +135,8 @@ def _is_theirs(frame: FrameType, home: str) -> bool:
     return not os.path.abspath(path).startswith(_NOT_THEIRS)
 
 
-def _show(error: BaseException) -> None:
+def show_traceback(error: BaseException) -> None:
+    """Write the traceback of `error` to standard error, where tracebacks are wanted."""
     if not (_Switch.on or os.environ.get(TRACEBACK) == "1"):
         return
     try:

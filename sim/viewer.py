@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+from sim.processes import die_with_parent
 from sim.recording import RecordingError
 
 
@@ -48,6 +49,7 @@ def open_viewer(path: str | Path | None = None, *, web: bool = False) -> Viewer:
         env={**os.environ, "RERUN_ANALYTICS": "0"},
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         start_new_session=True,
+        preexec_fn=die_with_parent if web else None,  # a window may stay, a server may not
     )  # fmt: skip
     for port in (grpc_port, web_port) if web else (grpc_port,):
         await_port(process, port)

@@ -53,8 +53,10 @@ from scenarios.harness.cli_options import (
 from scenarios.harness.cli_reports import attempt, check_file, losses, refusal, reporting, usage, write
 from scenarios.harness.cli_values import Commands, number_in, whole_in
 from scenarios.harness.console import INTERRUPTED, USAGE
-from sim.blame import show_tracebacks
+from scenarios.harness.guard import BROKEN
+from sim.blame import show_traceback, show_tracebacks
 from sim.signals import listening
+from sim.wording import described
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
 
@@ -81,6 +83,10 @@ def run(arguments: list[str]) -> int:
         return USAGE
     except (typer.Abort, KeyboardInterrupt):
         code = INTERRUPTED
+    except Exception as error:  # a fault of ours: one line, and never a verdict that looks complete
+        console.error(f"internal error: {described(error)}; wingslevel --traceback shows where")
+        show_traceback(error)
+        return BROKEN
     if code == INTERRUPTED:
         console.error("interrupted")
     return code

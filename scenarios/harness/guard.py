@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 from sim.processes import end_with_parent
 from sim.signals import ENDING, listening, on_extended
-from sim.wording import described
+from sim.wording import described, printable
 
 FAILED, USAGE, BROKEN = 1, 2, 3  # exit codes
 GRACE_S = 5.0  # what a process gets to end by itself
@@ -91,7 +91,7 @@ def guarded(command: Callable[[], int]) -> int:
         if heard.watched and heard.watched not in lost:
             lost[heard.watched] = Lost(heard.timed_out, ended)
             continue
-        sys.stderr.write(f"wingslevel: the process {ended} {heard.stage}\n")
+        sys.stderr.write(f"wingslevel: the process {ended} {printable(heard.stage)}\n")
         return heard.code
 
 

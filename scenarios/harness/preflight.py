@@ -3,12 +3,15 @@
 from collections.abc import Mapping
 from typing import Any
 
+from scenarios.harness import guard
 from scenarios.harness.aboard import flight_code, require_heard, unheard
 from scenarios.harness.catalogue import aircraft
 from scenarios.harness.config import FlightConfig, override, resolve
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
+
+_BEFORE = "before anything was flown or written; does"
 
 
 def prepared(name: str, changes: Mapping[str, Any], *, lenient: bool = False) -> tuple[Scenario, FlightConfig]:
@@ -20,10 +23,12 @@ def prepared(name: str, changes: Mapping[str, Any], *, lenient: bool = False) ->
     ------
     ValueError      one line: what is wrong, and what would be right
     """
+    guard.stage(f"{_BEFORE} scenario {name!r} end it?", guard.USAGE)
     scenario = find(name)
     config = resolve(override(scenario.config, changes))
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
+    guard.stage(f"{_BEFORE} {config.estimator!r} or {config.autopilot!r} end it?", guard.USAGE)
     code = flight_code(config)
     if not lenient:
         require_heard(config, code)

@@ -91,6 +91,7 @@ def fly(
 
         with guard.watched(_FLIGHT, None if limit_s is None else limit_s + guard.GRACE_S), limited(limit_s):
             flight = fly_config(scenario, config, watch=watch)
+    guard.stage("after the flight", guard.BROKEN)
     _warn_if_late(flight)
     judged = judge(scenario, flight)
     flight = replace(flight, manifest={**flight.manifest, "verdict": recording.plain(judged.rows)})  # for its story

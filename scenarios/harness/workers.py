@@ -23,6 +23,7 @@ from estimator import compiling
 from scenarios.harness import console
 from scenarios.harness.guard import GRACE_S
 from scenarios.harness.plugins import PluginError
+from sim.blame import show_tracebacks, tracebacks_shown
 from sim.log import Outcome
 from sim.processes import end_with_parent
 from sim.signals import Interrupted, TimedOut, limited, on_extended
@@ -152,7 +153,7 @@ class _Worker(Generic[_Result]):
             context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
             self._extended_s = context.Value("d", 0.0)
             self._pool = ProcessPoolExecutor(
-                1, mp_context=context, initializer=_set_up, initargs=(self._extended_s, self._told)
+                1, mp_context=context, initializer=_set_up, initargs=(self._extended_s, self._told, tracebacks_shown())
             )
             with _held_back():
                 self.future = self._pool.submit(os.getpid)
@@ -233,8 +234,9 @@ def _how(exitcode: int | None) -> str:
     return "ended by itself" + ("" if exitcode is None else f" (exit code {exitcode})")
 
 
-def _set_up(extended_s: Any, told: Any) -> None:
+def _set_up(extended_s: Any, told: Any, tracebacks: bool) -> None:
     """In a new process."""
+    show_tracebacks(tracebacks)
     end_with_parent()
 
     def extend(seconds: float) -> None:
