@@ -7,6 +7,7 @@ after it has begun to write.
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -99,10 +100,11 @@ def kill_often(folder, n, seed):
         killed += process.returncode == -signal.SIGKILL
         assert group_is_gone(process)
         assert all(recording.load(path) for path in Path("flights").glob("[!.]*"))  # complete before anybody clears up
-        assert run([*FLY, "--no-rerun", "--seed", str(k), "--json", "next.json"]) in (0, 1)
-        check_all(here)
+        if k % 3 == 2 or k == n - 1:
+            assert run([*FLY, "--no-rerun", "--seed", str(k), "--json", "next.json"]) in (0, 1)
+            assert check_all(here) > 0
+            shutil.rmtree("flights")
     assert killed > n // 3
-    assert len(list(Path("flights").glob(f"*seed{n - 1}"))) == 1
 
 
 def test_kill_a_few_moments_leave_nothing_half_done(tmp_path, monkeypatch):

@@ -76,7 +76,7 @@ def test_fly_without_room_for_the_report_says_so_after_the_verdict(capfd):
 
 def test_aircraft_one_report_without_room_does_not_lose_the_other(capfd):
     """A picture that cannot be written: the page is printed and its JSON written."""
-    with full(20_000):
+    with full(60_000):
         assert run(["aircraft", "endurance", "--picture", "p.png", "--json", "s.json"]) == 2
     said = capfd.readouterr()
     assert said.err.endswith("cannot write to p.png: File too large\n")
