@@ -70,6 +70,8 @@ def fly(scenario_name: str, changes: Mapping[str, Any], into: Path, *, rerun: bo
                 live_view(log, n_rows)
 
         flight = fly_config(scenario, config, watch=watch)
+    if flight.outcome == Outcome.INTERRUPTED and not len(flight.log):
+        raise KeyboardInterrupt  # while the kernels were compiled: there is nothing to judge or to keep
     judged = judge(scenario, flight)
     flight = replace(flight, manifest={**flight.manifest, "verdict": recording.plain(judged.rows)})  # for its story
     if live_view is not None:
