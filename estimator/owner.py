@@ -49,9 +49,9 @@ def _lives(pid: int, began: str) -> bool:
     """Whether process `pid` runs, and is the one that `began` then."""
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
+    except (ProcessLookupError, OverflowError):
         return False
-    except (OSError, OverflowError, ValueError):
+    except OSError:
         pass  # somebody else's, or a system that does not tell
     now = _began(pid)
     return "0" in (began, now) or began == now

@@ -46,8 +46,11 @@ def probe(folder: Path) -> None:
     OSError      why not
     """
     here = _existing(folder)
-    if here != folder and os.path.lexists(folder):
-        raise OSError(errno.ENOENT, "it is a link to a place that does not exist")
+    for missing in (folder, *folder.parents):
+        if missing == here or missing.exists():
+            break
+        if os.path.lexists(missing):
+            raise OSError(errno.ENOENT, f"{missing.name} is a link to a place that does not exist")
     sweep(here)
     file = hidden(here / "test")
     try:
@@ -67,6 +70,10 @@ class Draft:
     path: Path
     place: Path
 
+    def named(self, text: str) -> str:
+        """`text` about what is being written, with the names that it will have."""
+        return text.replace(str(self.path), str(self.place))
+
 
 @contextmanager
 def new_folder(into: Path, name: str) -> Iterator[Draft]:
@@ -81,7 +88,7 @@ def new_folder(into: Path, name: str) -> Iterator[Draft]:
     name = _fit(name)
     here = _existing(into)
     if here != into:
-        into = Path(os.path.abspath(into))  # folders that are not there yet: ``..`` means nothing in them
+        into = Path(os.path.normpath(into))  # folders that are not there yet: ``..`` means nothing in them
     sweep(here, here.parent)
     shell = hidden(here / name)
     draft = Draft(shell / name, into / name)

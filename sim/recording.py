@@ -135,7 +135,10 @@ def new_folder(into: Path, name: str) -> Iterator[drafts.Draft]:
     """
     try:
         with drafts.new_folder(into, name) as draft:
-            yield draft
+            try:
+                yield draft
+            except RecordingError as error:
+                raise RecordingError(draft.named(str(error))) from error
     except OSError as error:
         raise _unwritable(into / name, error) from error
 
@@ -304,7 +307,10 @@ def _sha256(path: Path) -> str:
 
 
 def _unwritable(path: Path, error: OSError) -> RecordingError:
-    return RecordingError(f"cannot write to {path}: {error.strerror or _first_line(error)}")
+    said = error.strerror or _first_line(error)
+    if error.errno and "[errno" in said:  # Arrow's long way to say it
+        said = os.strerror(error.errno)
+    return RecordingError(f"cannot write to {path}: {said}")
 
 
 def _first_line(error: Exception) -> str:

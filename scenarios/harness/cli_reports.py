@@ -1,16 +1,20 @@
 """What every command does alike: refuse in one line what it cannot do, and write its reports, whole or not at all."""
 
+import io
 import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import IO, Any, TextIO
+from typing import IO, TYPE_CHECKING, Any, TextIO
 
 import typer
 
 from scenarios.harness import console, guard
 from sim.wording import json_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @contextmanager
@@ -130,8 +134,18 @@ def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
             except OSError as error:
                 raise RecordingError(f"cannot write to {path}: {error.strerror}") from error
             return
-        with replacing(target) as temporary:
-            temporary.write_bytes(data)
+        try:
+            with replacing(target) as temporary:
+                temporary.write_bytes(data)
+        except RecordingError as error:
+            raise RecordingError(str(error).replace(str(target), str(path))) from error
+
+
+def write_figure(path: Path, figure: "Figure", dpi: int) -> None:
+    """Write a figure of Matplotlib as a report; the ending of `path` says the format."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=path.suffix[1:].lower(), dpi=dpi)
+    write(path, buffer.getvalue)
 
 
 _lost: list[str] | None = None  # what could not be written inside `losses`

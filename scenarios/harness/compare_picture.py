@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from estimator.interface import Array
+from scenarios.harness.cli_reports import write_figure
 from scenarios.harness.compare import LETTERS, Comparison, Entrant, checks_text
 from scenarios.harness.handbook_picture import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
 from scenarios.harness.metrics import Series, p95, rms
@@ -54,7 +55,7 @@ def draw(comparison: Comparison, path: Path) -> None:
         _strips(inclination, flown, colours, "inclination")
         _strips(heading, flown, colours, "heading")
         _costs(cost, flown, colours)
-        figure.savefig(path, dpi=DPI)
+        write_figure(path, figure, DPI)
 
 
 def _heading(figure: Any, comparison: Comparison, height: float) -> None:

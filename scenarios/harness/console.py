@@ -145,7 +145,7 @@ class _Compiling:
                 sys.stderr.flush()
 
     def _count(self, progress: compiling.Progress, seconds: float) -> None:
-        count = f"{progress.compiled - self._first} kernels compiled, {seconds:.0f} s"
+        count = f"kernels compiled: {progress.compiled - self._first}, {seconds:.0f} s"
         if _bars:
             bar = _bars[-1]
             for task in bar.tasks:

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from scenarios.harness.cli_reports import write_figure
 from scenarios.harness.handbook import MODE_HEADINGS, TITLES, Handbook, figures, glide_ratio, mode_rows
 from sim.linear import Mode, linearise, modes
 from sim.performance import radius_m
@@ -72,7 +73,7 @@ def draw(book: Handbook, path: Path) -> None:
         _turns(figure.add_subplot(grid[1, 2]), book)
         _figure_table(figure.add_subplot(grid[2, 0]), book)
         _mode_table(figure.add_subplot(grid[2, 1:]), book)
-        figure.savefig(path, dpi=DPI)
+        write_figure(path, figure, DPI)
 
 
 def _heading(figure: Any, book: Handbook) -> None:

@@ -21,7 +21,9 @@ def record(flight: Flight, into: Path, name: str, *, rerun: bool) -> Path | None
         with recording.new_folder(into, name) as draft:
             recording.save(flight, draft.path)
             if rerun:
-                with cli_reports.attempt():
+                try:
                     viewing.write_rerun(flight, draft.path)
+                except recording.RecordingError as problem:
+                    cli_reports.lose(draft.named(str(problem)), problem)
         return draft.place
     return None

@@ -15,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.interface import Array
+from scenarios.harness.cli_reports import write_figure
 from scenarios.harness.handbook_picture import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, VIOLET
 from scenarios.harness.sensor_page import NAMES, Page
 from scenarios.harness.sensor_trial import AtRest, MagneticTrial, Response
@@ -41,7 +42,7 @@ def draw(page: Page, path: Path) -> None:
             for (first, last), panel in zip(((0, 12), (14, 22), (24, 30)), row, strict=False):
                 panel(figure.add_subplot(grid[i, first:last]))
         _heading(figure, page, height)
-        figure.savefig(path, dpi=DPI)
+        write_figure(path, figure, DPI)
 
 
 def _rows(page: Page) -> list[list[Panel]]:

@@ -91,6 +91,8 @@ def fly(
 
         with guard.watched(_FLIGHT, None if limit_s is None else limit_s + guard.GRACE_S), limited(limit_s):
             flight = fly_config(scenario, config, watch=watch)
+    if flight.outcome == Outcome.INTERRUPTED and not len(flight.log):
+        raise KeyboardInterrupt  # while the kernels were compiled: there is nothing to judge or to keep
     guard.stage("after the flight", guard.BROKEN)
     _warn_if_late(flight)
     judged = judge(scenario, flight)
