@@ -35,7 +35,10 @@ _COMMAND_FAULTS = {
     2: f"mode {{0}} is no Mode: {', '.join(f'{m} {m.name}' for m in Mode)}",
 }
 _VECTORS = ((3, 3), (3,), (3,), (3,))
-_ndarray = np.ndarray
+_COLUMNS = dict(
+    zip(("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "wind_e_m_s", "health"), (*_VECTORS, ()), strict=True)
+)
+_ndarray = np.ndarray  # a global costs half of an attribute
 
 
 class Unusable(Refused):
@@ -165,11 +168,6 @@ def record_estimates(flown: NDArray[Any], estimates: object) -> tuple[int, str]:
         raise Unusable(_FAULTS[6])
     good, fault = _record_estimates(flown, *columns[:4], np.clip(columns[4], -1, N_HEALTH).astype(np.int64))
     return good, _FAULTS[fault] if fault else ""
-
-
-_COLUMNS = dict(
-    zip(("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "wind_e_m_s", "health"), (*_VECTORS, ()), strict=True)
-)
 
 
 def _plain_estimate(e: AttitudeEstimate) -> AttitudeEstimate:

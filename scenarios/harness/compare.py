@@ -73,7 +73,8 @@ class Task:
     def fly(self) -> Traced:
         """Fly it, judge it, and keep its errors."""
         scenario = find(self.scenario)
-        flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator, lenient=True)
+        options: dict[str, Any] = {"seed": self.seed, "estimator": self.estimator, "lenient": True, "kept": True}
+        flight = fly_scenario(scenario, self.overrides, **options)
         return Traced(judge(scenario, flight), inclination_error_deg(flight), heading_error_deg()(flight))
 
     def lost(self, outcome: Outcome, message: str) -> Traced:
@@ -189,14 +190,20 @@ class Comparison:
 
     @property
     def exit_code(self) -> int:
-        """0 where all flew, 1 where an estimator or autopilot failed, 3 where a simulation blew up, 130 interrupted."""
+        """As of the command line.
+
+        0 where all flew, 1 where flight code or the scenario's own functions failed, 3 where a simulation blew up, 130
+        where it was interrupted
+        """
         outcomes = {f.verdict.outcome for e in self.entrants for f in e.flights}
         if not self.whole:
             return console.INTERRUPTED
         if Outcome.DIVERGED in outcomes:
             return 3
         not_timed = any(e.timing is not None and e.timing.failure for e in self.entrants)
-        return 1 if not_timed or outcomes & {*FLIGHT_CODE_FAILED, Outcome.AUTOPILOT_FAILED} else 0
+        raised = any(row.raised for e in self.entrants for f in e.flights for row in f.verdict.rows)
+        failed = outcomes & {*FLIGHT_CODE_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.SCENARIO_FAILED}
+        return 1 if failed or not_timed or raised else 0
 
     def to_json(self) -> dict[str, Any]:
         """All of it as plain data: a line per estimator, and the verdict on every flight as `check` writes it."""
@@ -455,7 +462,7 @@ def tell(comparison: Comparison) -> None:
             console.line(f"{entrant.name}, while it was timed: {entrant.timing.failure}", "red")
         for flown in entrant.flights:
             v = flown.verdict
-            if v.outcome != Outcome.COMPLETED:
+            if v.outcome != Outcome.COMPLETED or any(row.raised for row in v.rows):
                 at = f" at {v.metrics.get('flown_s') or 0.0:.1f} s" if v.rows else ""
                 why = f"{v.outcome.replace('_', ' ')}{at}" + (f": {v.message}" if v.message else "")
                 console.line(f"{entrant.name}, seed {v.seed}: {why}", "red")

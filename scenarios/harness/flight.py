@@ -21,8 +21,8 @@ from scenarios.harness.config import (
 )
 from scenarios.harness.fault_config import parse_fault
 from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import Maker, PluginError, learnt, maker_name
-from scenarios.harness.scenario import Scenario
+from scenarios.harness.plugins import Maker, PluginError, heading_reference_of, learnt, maker_name
+from scenarios.harness.scenario import Scenario, ScriptFailed
 from sim.clock import Rates
 from sim.events import events_of_faults
 from sim.jsbsim_plant import FlightBox, JsbsimPlant
@@ -45,6 +45,7 @@ def fly_scenario(
     estimator: str | Maker | None = None,
     watch: Watch | None = None,
     lenient: bool = False,
+    kept: bool = False,
 ) -> Flight:
     """Fly `scenario` once.
 
@@ -56,6 +57,7 @@ def fly_scenario(
                     flight; it wins over the one of `overrides`, None is the scenario's own
     watch           called once a simulated second, see `sim.loop.fly`
     lenient         accept a property of the instruments that is set and that no flight code has a parameter for
+    kept            of many flights: a script that raises for this one is its outcome, and no error
 
     Raises
     ------
@@ -71,7 +73,7 @@ def fly_scenario(
     if estimator is not None:
         changes["estimator"] = maker_name(estimator)
     config = override(scenario.config, changes)
-    return fly_config(scenario, config, maker=maker, watch=watch, lenient=lenient)
+    return fly_config(scenario, config, maker=maker, watch=watch, lenient=lenient, kept=kept)
 
 
 def _of_python(value: Any) -> Any:
@@ -92,6 +94,7 @@ def fly_config(
     maker: Maker | None = None,
     watch: Watch | None = None,
     lenient: bool = False,
+    kept: bool = False,
 ) -> Flight:
     """Fly `scenario` under `config`, drawing what it leaves to chance; `maker` makes the estimator where it is given.
 
@@ -106,7 +109,20 @@ def fly_config(
     if not lenient:
         require_heard(config, code)
     (estimator, known), (pilot, _) = code
-    script = scenario.scripted(config)
+    manifest = {
+        "scenario": scenario.name,
+        "seed": config.seed,
+        "config": config.model_dump(mode="json"),
+        "known": to_json(instruments_of(config)),
+    }
+    try:
+        script = scenario.scripted(config)
+    except ScriptFailed as problem:
+        if not kept:
+            raise
+        reference, outcome = heading_reference_of(estimator), Outcome.SCENARIO_FAILED
+        events = (Event(0.0, str(problem), "error"),)
+        return Flight(Log.empty(0), rates.dt_s, 0.0, outcome, reference, str(problem), events, manifest)
     plant = plant_of(config, rates)
     faults = [parse_fault(fault) for fault in config.faults]
     sensors = suite_params(config.suite, config.sensors, config.files)
@@ -121,13 +137,7 @@ def fly_config(
         Log.empty(rates.ticks(plant.release_s + config.duration_s)),
         calibration_s=config.calibration_s,
         on_ground=on_ground,
-        manifest={
-            "scenario": scenario.name,
-            "seed": config.seed,
-            "config": config.model_dump(mode="json"),
-            "known": to_json(instruments_of(config)),
-        }
-        | ({} if on_ground is None else {"on_ground": plain(on_ground._asdict())}),
+        manifest=manifest | ({} if on_ground is None else {"on_ground": plain(on_ground._asdict())}),
         watch=watch,
     )
     return _told(flown, scenario, faults, estimator, known)

@@ -39,8 +39,8 @@ class Task:
     def fly(self) -> FlightVerdict:
         """Fly it and judge it."""
         began_s, scenario = time.monotonic(), find(self.scenario)
-        judged = judge(scenario, fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator))
-        return replace(judged, wall_s=time.monotonic() - began_s)
+        flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator, kept=True)
+        return replace(judge(scenario, flight), wall_s=time.monotonic() - began_s)
 
     def lost(self, outcome: Outcome, message: str) -> FlightVerdict:
         """The verdict where nothing came back."""

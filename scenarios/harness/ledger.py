@@ -8,7 +8,7 @@ since is left out, with a line that says so, and its flight is flown again.
 import hashlib
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,7 @@ def _sha256(plain: Any) -> str:
 
 def _written(v: FlightVerdict) -> dict[str, Any]:
     """A verdict as plain data, from which `_read` makes the same one, bit for bit."""
-    rows = [[r.name, r.unit, _number(r.measured), r.sense, r.limit, r.passed, r.note] for r in v.rows]
+    rows = [asdict(row) | {"measured": _number(row.measured)} for row in v.rows]
     return {
         "scenario": v.scenario, "estimator": v.estimator, "seed": v.seed, "flight": v.flight,
         "outcome": str(v.outcome), "message": v.message, "rows": rows, "metrics": v.metrics,
@@ -86,10 +86,7 @@ def _written(v: FlightVerdict) -> dict[str, Any]:
 
 
 def _read(plain: dict[str, Any]) -> FlightVerdict:
-    rows = tuple(
-        Row(name, unit, _NUMBERS.get(measured, measured), sense, limit, passed, note)
-        for name, unit, measured, sense, limit, passed, note in plain["rows"]
-    )
+    rows = tuple(Row(**row | {"measured": _NUMBERS.get(row["measured"], row["measured"])}) for row in plain["rows"])
     known = {name: Known.from_json(entry) for name, entry in plain["known"].items()}
     return FlightVerdict(
         plain["scenario"], plain["estimator"], plain["seed"], Outcome(plain["outcome"]), rows, plain["metrics"],

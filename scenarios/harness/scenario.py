@@ -14,6 +14,10 @@ from sim.log import Event, Flight
 Moments = Callable[[Flight], Iterable[float]]  # times since the release
 
 
+class ScriptFailed(ValueError):
+    """A scenario's script that raised, or that returned none."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scenario:
     """One scenario; its file exports it as ``SCENARIO``, and variants of it as ``SCENARIOS``.
@@ -73,9 +77,9 @@ class Scenario:
 
         Raises
         ------
-        ValueError      one line: the scenario's script raises, or returns none
+        ScriptFailed    one line: the scenario's script raises, or returns none
         """
-        with theirs(lambda line: ValueError(f"scenario {self.name}: script: {line}"), home_of(self.script)):
+        with theirs(lambda line: ScriptFailed(f"scenario {self.name}: script: {line}"), home_of(self.script)):
             script = self.script(config)
             if type(script) is not Script:
                 raise Refused(f"it returned {shown(script)}, must return a Script")

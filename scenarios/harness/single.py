@@ -15,7 +15,7 @@ from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Flight, Log, Outcome
-from sim.signals import limited
+from sim.signals import TimedOut, limited
 
 _FLIGHT = "the flight"
 LATE_SHARE = 0.05  # of the updates; a few are late on any machine that has other things to do
@@ -79,8 +79,7 @@ def fly(
     if _FLIGHT in guard.lost:
         timed_out, message = guard.lost[_FLIGHT]
         outcome = Outcome.TIMED_OUT if timed_out else Outcome.WORKER_DIED
-        gone = FlightVerdict(scenario.name, config.estimator, config.seed, outcome, (), {}, f"the process {message}")
-        return Flown(scenario, None, gone, None)
+        return _nothing_of(scenario, config, outcome, f"the process {message}")
     live_view = viewing.live(scenario.name, config, web=web) if live else None
     with console.progress(f"flying {scenario.name}", "s") as advance:
 
@@ -89,8 +88,11 @@ def fly(
             if live_view is not None:
                 live_view(log, n_rows)
 
-        with guard.watched(_FLIGHT, None if limit_s is None else limit_s + guard.GRACE_S), limited(limit_s):
-            flight = fly_config(scenario, config, watch=watch)
+        try:
+            with guard.watched(_FLIGHT, None if limit_s is None else limit_s + guard.GRACE_S), limited(limit_s):
+                flight = fly_config(scenario, config, watch=watch)
+        except TimedOut:  # before the first tick, or after the last
+            return _nothing_of(scenario, config, Outcome.TIMED_OUT, f"took longer than {limit_s:g} s")
     if flight.outcome == Outcome.INTERRUPTED and not len(flight.log):
         raise KeyboardInterrupt  # while the kernels were compiled: there is nothing to judge or to keep
     guard.stage("after the flight", guard.BROKEN)
@@ -101,6 +103,13 @@ def fly(
         live_view.close(flight)
     folder = record(flight, into, _name(scenario.name, config), rerun=rerun)
     return Flown(scenario, flight, judged, folder, live_view)
+
+
+def _nothing_of(scenario: Scenario, config: FlightConfig, outcome: Outcome, message: str) -> Flown:
+    """A flight of which nothing is left but how it ended."""
+    return Flown(
+        scenario, None, FlightVerdict(scenario.name, config.estimator, config.seed, outcome, (), {}, message), None
+    )
 
 
 def _warn_if_late(flight: Flight) -> None:

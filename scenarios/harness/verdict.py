@@ -16,7 +16,7 @@ PASSED, FAILED, SIMULATION_FAILED = 0, 1, 3  # exit codes; 2 is for usage and co
 # Outcomes that are no result of flying: what was to be judged is not there, or only half of it.
 BROKEN = frozenset(
     (Outcome.DIVERGED, Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.TIMED_OUT, Outcome.WORKER_DIED,
-     Outcome.INTERRUPTED)
+     Outcome.SCENARIO_FAILED, Outcome.INTERRUPTED)
 )  # fmt: skip
 
 

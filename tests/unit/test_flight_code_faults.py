@@ -1,13 +1,17 @@
 """Whatever flight code raises, and wherever: one line with its place, the right exit code, and the recording kept."""
 
 import re
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
 
+from scenarios.harness import plugins
 from scenarios.harness.cli import run
+from scenarios.harness.plugins import load_estimator
 from sim import recording
 from sim.log import Outcome
+from sim.signals import TimedOut, limited
 
 # What is raised: what it needs at the head of the file, the statement, and the line that tells of it.
 RAISED = {
@@ -246,3 +250,56 @@ def test_list_that_names_nothing_is_refused(here: Path, capfd, command, says) ->
     """It is not the same as leaving the option out."""
     assert run(list(command)) == 2
     assert says in check_refused(capfd)
+
+
+@pytest.mark.parametrize("statement", ["signal.raise_signal(signal.SIGINT)", "swallowed()"])
+@pytest.mark.parametrize("where", ["import", "__init__"])
+def test_ctrl_c_while_flight_code_is_loaded_ends_the_command(here: Path, capfd, where: str, statement: str) -> None:
+    """A real one, even one that the code swallows: not the code's fault."""
+    head = (
+        "import signal\n"
+        "def swallowed():\n"
+        "    try: signal.raise_signal(signal.SIGINT)\n"
+        "    except BaseException: raise ValueError('nothing')\n"
+    )
+    (here / "own.py").write_text(
+        f"{head}{statement if where == 'import' else ''}\n"
+        f"class Mine:\n    def __init__(self): {statement}\n    def update(self, m): pass\n"
+    )
+    assert run(list(FLY)) == 130
+    assert capfd.readouterr().err == "wingslevel: interrupted\n"
+
+
+def test_time_limit_while_flight_code_is_made_passes_through(here: Path) -> None:
+    """It is the flight's, and no fault that the code could be blamed for."""
+    (here / "own.py").write_text(
+        "class Mine:\n    def __init__(self):\n        while True: pass\n    def update(self, m): pass"
+    )
+    with pytest.raises(TimedOut), limited(0.1):
+        load_estimator("own.py:Mine")
+
+
+@pytest.mark.parametrize("raised", ["exit", "ctrl_c", "stop", "silent"])
+@pytest.mark.parametrize("place_of", ["site-packages", "."])
+def test_entry_point_that_raises_is_refused_with_the_line_of_its_package(
+    here: Path, monkeypatch, raised: str, place_of: str
+) -> None:
+    """Installed code is not the user's, but for the package that offers the estimator."""
+    folder = here / place_of / f"offered_{raised}"
+    folder.mkdir(parents=True)
+    (folder / "__init__.py").write_text(own("import", raised))
+    monkeypatch.syspath_prepend(str(folder.parent))
+    point = EntryPoint("theirs", f"offered_{raised}:Mine", "wingslevel.estimators")
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [point] if group == point.group else [])
+    number = 1 + own("import", raised).splitlines().index(RAISED[raised][1])
+    with pytest.raises(plugins.PluginError, match=rf"estimator 'theirs': .* \(__init__\.py, line {number}\)$"):
+        load_estimator("theirs")
+
+
+def test_module_that_raises_is_refused_with_its_line(here: Path) -> None:
+    """Named as ``package.module:Class``."""
+    (here / "package_of_own").mkdir()
+    (here / "package_of_own" / "__init__.py").touch()
+    (here / "package_of_own" / "inner.py").write_text(own("__init__", "exit"))
+    with pytest.raises(plugins.PluginError, match=r"SystemExit: 0 \(inner\.py, line 6, in __init__\)$"):
+        load_estimator("package_of_own.inner:Mine")
