@@ -117,7 +117,8 @@ def replacing(path: Path) -> Iterator[Path]:
     ------
     RecordingError    where the system refuses to write
     """
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    ending = path.suffix if len(path.suffix) < 9 else ""
+    temporary = path.with_name(f".{path.stem[:40]}.{os.getpid()}.tmp{ending}")  # no longer than names may be
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield temporary

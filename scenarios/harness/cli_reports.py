@@ -1,7 +1,9 @@
 """What every command does alike: refuse in one line what it cannot do, and write its reports, whole or not at all."""
 
+import errno
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
@@ -72,8 +74,22 @@ def check_file(path: Path | None) -> None:
         raise refusal(f"cannot write to {path}: there is no folder {path.parent}")
     # A file is replaced, which its folder must allow; a device or a pipe is written to.
     target = path.resolve()
-    if not os.access(target if _is_stream(target) else target.parent, os.W_OK):
-        raise refusal(f"cannot write to {path}: permission denied")
+    try:
+        if not _is_stream(target):
+            tempfile.TemporaryFile(dir=target.parent).close()
+        elif not os.access(target, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        elif target.is_char_device():
+            _try_device(target)
+    except OSError as error:
+        raise refusal(f"cannot write to {path}: {(error.strerror or str(error)).lower()}") from error
+
+
+def _try_device(path: Path) -> None:
+    """Write a blank to a device that is no terminal: nothing else tells one that is always full."""
+    with path.open("wb", buffering=0) as device:
+        if not device.isatty():
+            device.write(b" ")
 
 
 def _is_stream(path: Path) -> bool:

@@ -13,6 +13,7 @@ from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.plugins import shared_settings, without
 from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, make, replay, why_none
 from sim import recording
+from sim.wording import file_name
 
 _HEADINGS = ("", "inclination\n   RMS    p95    max", "heading\nRMS", "rotation\n   RMS    max", "ns per\nupdate")
 _SHOWN = (
@@ -104,7 +105,7 @@ def run(
     stem = log.name.partition(".")[0]
     for replayed in replays:
         flight = as_flight(log, replayed, window)
-        folder = recording.save(flight, _free_folder(into, f"replay_{stem}-{replayed.estimator}"))
+        folder = recording.save(flight, _free_folder(into, f"replay_{file_name(stem)}-{file_name(replayed.estimator)}"))
         folders[replayed.estimator] = folder
         if rerun:
             with console.progress(f"recording {replayed.estimator}", "") as _:

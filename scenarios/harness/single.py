@@ -14,6 +14,7 @@ from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Flight, Log, Outcome
+from sim.wording import file_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +96,8 @@ def tell(flown: Flown) -> None:
 
 def _free_folder(into: Path, scenario: str, config: FlightConfig) -> Path:
     """A new folder, made here: no flight is ever written over another, whoever else is flying."""
-    estimator = config.estimator.rpartition(":")[2]
-    name = f"{scenario}-{estimator}-seed{config.seed}"
+    estimator = file_name(config.estimator.rpartition(":")[2])
+    name = f"{file_name(scenario)}-{estimator}-seed{config.seed}"
     i = 1
     while True:
         path = into / (name if i == 1 else f"{name}-{i}")

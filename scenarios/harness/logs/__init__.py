@@ -42,6 +42,8 @@ def read(
     """
     if not path.exists():
         raise LogError(f"no log at {path}: there is no such file")
+    if path.is_char_device():
+        raise LogError(f"{path}: a device, which may never end; name a file")
     if columns is None and vectors.is_reference(path):
         return checks.mended(vectors.read(path, reference), path)
     log = _read(path, None if columns is None else column_map.load(columns), imu)
@@ -54,6 +56,8 @@ def _against(log: RecordedLog, path: Path) -> RecordedLog:
 
     if not path.exists():
         raise LogError(f"no reference at {path}: there is no such file")
+    if path.is_char_device():
+        raise LogError(f"{path}: a device, which may never end; name a file")
     rows_s, ledger, repairs = log.rows["t_s"], accounts.without(log.ledger, "reference"), list(log.repairs)
     reader = _module(path.name.lower(), _BY_MAP)
     kind: reference_file.Kind = "filter"
