@@ -11,7 +11,7 @@ from typing import IO, Any, TextIO
 
 import typer
 
-from sim.wording import json_text
+from sim.wording import brief, json_text
 
 
 @contextmanager
@@ -19,6 +19,9 @@ def usage() -> Iterator[None]:
     """What is refused inside the block is the user's to mend: one line, exit code 2."""
     try:
         yield
+    except UnicodeEncodeError as problem:
+        text = problem.object[max(0, problem.start - 40) : problem.end + 40]
+        raise refusal(f"{brief(text)}: holds what is no Unicode text; choose another name") from problem
     except ValueError as problem:
         raise refusal(str(problem)) from problem
     except OSError as problem:  # a name that is too long, a folder that may not be looked into
