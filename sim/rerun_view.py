@@ -30,6 +30,7 @@ from sim.recording import RecordingError, digest, replacing
 from sim.story import setting, story
 from sim.viewer import Viewer as Viewer
 from sim.viewer import open_viewer as open_viewer
+from sim.wording import printable
 
 if TYPE_CHECKING:
     import rerun as rr
@@ -188,7 +189,7 @@ def _stream(manifest: Mapping[str, Any], recording_id: str | None) -> "rr.Record
     rec.set_log_time_enabled(False)
     scenario, estimator = setting(manifest, "scenario", "flight"), setting(manifest, "estimator", "estimator")
     seed = setting(manifest, "seed")
-    rec.send_recording_name(f"{scenario}, {estimator}" + ("" if seed is None else f", seed {seed}"))
+    rec.send_recording_name(printable(f"{scenario}, {estimator}" + ("" if seed is None else f", seed {seed}")))
     return rec
 
 
@@ -375,7 +376,7 @@ def _send_end(rec: "rr.RecordingStream", flight: Flight) -> None:
     events: Sequence[Event] = flight.events
     if events:
         when = [rr.TimeColumn(TIMELINE, duration=_ns(np.array([e.t_s for e in events]) - flight.release_s))]
-        columns = rr.TextLog.columns(text=[e.text for e in events], level=[e.level.upper() for e in events])
+        columns = rr.TextLog.columns(text=[printable(e.text) for e in events], level=[e.level.upper() for e in events])
         rec.send_columns("events", when, columns)
     rec.log("story", rr.TextDocument(story(flight), media_type=rr.MediaType.MARKDOWN), static=True)
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from sim.log import Flight
+from sim.wording import markdown
 
 
 def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> Any:
@@ -20,17 +21,18 @@ def story(flight: Flight) -> str:
     what = ", ".join([*(str(name) for name in names if name), *([] if seed is None else [f"seed {seed}"])])
     end_s = float(flight.log.truth["t_s"][-1]) - flight.release_s if len(flight.log) else 0.0
     how = flight.outcome.replace("_", " ").capitalize() + f" at {end_s:.1f} s"
-    lines = [f"## {what}", "", how + (f": {flight.message}. " if flight.message else ". ") + _air(manifest), ""]
+    message = f": {markdown(flight.message)}. " if flight.message else ". "
+    lines = [f"## {markdown(what)}", "", how + message + _air(manifest), ""]
     verdict = manifest.get("verdict") or ()
     if verdict:
         lines += ["| check | measured | limit | |", "|-|-:|-:|-|"]
         for row in verdict:
-            measured, limit = (_figure(row[key], row["unit"]) for key in ("measured", "limit"))
+            measured, limit = (_figure(row[key], markdown(row["unit"])) for key in ("measured", "limit"))
             passed = "passed" if row["passed"] else "**FAILED**"
-            lines.append(f"| {row['name']} | {measured} | {row.get('sense', '<=')} {limit} | {passed} |")
+            lines.append(f"| {markdown(row['name'])} | {measured} | {row.get('sense', '<=')} {limit} | {passed} |")
     lines += ["", f"Heading is judged against the true {flight.heading_reference}.", ""]
     orange = setting(manifest, "reference", "the truth")  # of a replayed log: whatever attitude it holds
-    lines += [f"Orange is {orange}, blue the estimate, green a sensor, grey a demand."]
+    lines += [f"Orange is {markdown(orange)}, blue the estimate, green a sensor, grey a demand."]
     return "\n".join(lines)
 
 

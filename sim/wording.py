@@ -63,6 +63,12 @@ def markdown(text: str, longest: int = LONGEST) -> str:
     return line.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
+def file_name(text: str, longest: int = 80) -> str:
+    """`text` as a part of a file's name: letters, digits and ``._-+``, at most `longest` bytes."""
+    tame = "".join(c if c.isalnum() or c in "._-+" else "_" for c in text)
+    return tame.encode("utf-8", "replace")[:longest].decode("utf-8", "ignore")
+
+
 def plotted(text: str, longest: int = 80) -> str:
     """`text` as a label of matplotlib, to which dollars would be mathematics."""
     return printable(text, longest).replace("$", r"\$")

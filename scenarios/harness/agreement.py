@@ -109,6 +109,8 @@ def read(path: Path) -> dict[str, Any]:
     ValueError      one line: no such file, or no verdict in it
     """
     try:
+        if path.is_char_device():  # some of them never end
+            raise ValueError("a device")
         data = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ValueError(f"cannot read {path}: {error.strerror}") from error

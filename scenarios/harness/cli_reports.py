@@ -1,8 +1,10 @@
 """What every command does alike: refuse in one line what it cannot do, and write its reports, whole or not at all."""
 
+import errno
 import io
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
@@ -11,7 +13,7 @@ from typing import IO, TYPE_CHECKING, Any, TextIO
 import typer
 
 from scenarios.harness import console, guard
-from sim.wording import json_text
+from sim.wording import brief, json_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +24,9 @@ def usage() -> Iterator[None]:
     """What is refused inside the block is the user's to mend: one line, exit code 2."""
     try:
         yield
+    except UnicodeEncodeError as problem:
+        text = problem.object[max(0, problem.start - 40) : problem.end + 40]
+        raise refusal(f"{brief(text)}: holds what is no Unicode text; choose another name") from problem
     except ValueError as problem:
         raise refusal(str(problem)) from problem
     except OSError as problem:  # a name that is too long, a folder that may not be looked into
@@ -109,8 +114,22 @@ def check_file(path: Path | None) -> None:
         raise refusal(f"cannot write to {path}: there is no folder {path.parent}")
     # A file is replaced, which its folder must allow; a device or a pipe is written to.
     target = path.resolve()
-    if not os.access(target if _is_stream(target) else target.parent, os.W_OK):
-        raise refusal(f"cannot write to {path}: permission denied")
+    try:
+        if not _is_stream(target):
+            tempfile.TemporaryFile(dir=target.parent).close()
+        elif not os.access(target, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        elif target.is_char_device():
+            _try_device(target)
+    except OSError as error:
+        raise refusal(f"cannot write to {path}: {(error.strerror or str(error)).lower()}") from error
+
+
+def _try_device(path: Path) -> None:
+    """Write a blank to a device that is no terminal: nothing else tells one that is always full."""
+    with path.open("wb", buffering=0) as device:
+        if not device.isatty():
+            device.write(b" ")
 
 
 def _is_stream(path: Path) -> bool:

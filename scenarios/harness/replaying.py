@@ -14,6 +14,7 @@ from scenarios.harness.plugins import shared_settings, without
 from scenarios.harness.recorder import record
 from scenarios.harness.replay import Replayed, Window, as_flight, gone, judged_rows, known_to, make, replay, why_none
 from sim import recording
+from sim.wording import file_name
 
 _HEADINGS = ("", "inclination\n   RMS    p95    max", "heading\nRMS", "rotation\n   RMS    max", "ns per\nupdate")
 _SHOWN = (
@@ -118,7 +119,8 @@ def run(
             continue
         flight = as_flight(log, replayed, window)
         with console.progress(f"recording {replayed.estimator}", "") as _:
-            folder = record(flight, into, f"replay_{stem}-{replayed.estimator}", rerun=rerun)
+            name = f"replay_{file_name(stem)}-{file_name(replayed.estimator)}"
+            folder = record(flight, into, name, rerun=rerun)
         folders[replayed.estimator] = folder
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))

@@ -16,6 +16,7 @@ from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Flight, Log, Outcome
 from sim.signals import TimedOut, limited
+from sim.wording import file_name
 
 _FLIGHT = "the flight"
 LATE_SHARE = 0.05  # of the updates; a few are late on any machine that has other things to do
@@ -146,5 +147,4 @@ def tell(flown: Flown) -> None:
 
 def _name(scenario: str, config: FlightConfig) -> str:
     """Name of the folder of a recording."""
-    estimator = config.estimator.rpartition(":")[2]
-    return f"{scenario}-{estimator}-seed{config.seed}"
+    return f"{file_name(scenario)}-{file_name(config.estimator.rpartition(':')[2])}-seed{config.seed}"
