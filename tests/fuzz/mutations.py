@@ -175,7 +175,7 @@ def of_array(rng: Generator, values: Any) -> Any:
     """Damage of an array of numbers: an element, all of them, its shape or its type."""
     made = np.array(values)
     kind = int(rng.integers(9))
-    if kind <= 3 and made.size:
+    if kind <= 3 and made.size and made.dtype.kind == "f":
         made = made.astype(np.float64)
         made.flat[int(rng.integers(made.size))] = pick(rng, NUMBERS)
     elif kind == 4:
@@ -185,9 +185,9 @@ def of_array(rng: Generator, values: Any) -> Any:
     elif kind == 6:
         made = pick(rng, (made.T, made.ravel(), made[None], np.repeat(made, 2, axis=0)))
     elif kind == 7:
-        made = pick(rng, (made.astype("f4"), made.astype("i4", casting="unsafe"), made + 1j, made.astype("U5"), made > 0, made.astype(object)))
+        made = pick(rng, (made.astype("U5"), made.astype(object), *((made.astype("f4"), made.astype("i4"), made + 1j, made > 0) if made.dtype.kind == "f" else ())))
     else:
-        made = pick(rng, (np.zeros(0), np.array("text"), np.array([None, 1], object), np.zeros((2, 3, 4)), np.array(5.0)))
+        made = pick(rng, (np.zeros(0), np.array("text"), np.array(["a", 1.0], object), np.zeros((2, 3, 4)), np.array(5.0)))
     return made
 
 

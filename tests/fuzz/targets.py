@@ -15,9 +15,9 @@ import pyarrow.parquet as pq
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
-from scenarios.harness import logs
+from scenarios.harness import exporting, logs
 from scenarios.harness.logs import column_map
-from sim import gps_messages, recording
+from sim import gps_messages, recording, rerun_view
 from sim.gps_messages import Fixes
 from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.sensors.datasheet import load_part
@@ -37,6 +37,7 @@ class Target(NamedTuple):
     name : of the file, which is damaged        make : writes the file and what belongs to it into a folder
     damaged : of a generator, what the file holds instead       read : of the path of the file
     command : the arguments of a command that reads it, by its path; None where there is none that is quick
+    also : what else reads it, given the path and a folder to write to; it may refuse
     """
 
     name: str
@@ -44,6 +45,7 @@ class Target(NamedTuple):
     damaged: Callable[[Generator], bytes]
     read: Callable[[Path], Any]
     command: Callable[[Path], list[str]] | None = None
+    also: Callable[[Path, Path], Any] = lambda _path, _into: None
 
 
 def flight() -> Any:
@@ -371,7 +373,19 @@ def _recording(name: str, scratch: Path) -> Target:
     def read(path: Path) -> Any:
         return logs.read(path.parent if name == recording.MANIFEST else path)
 
-    return Target(name, make, damaged, read, lambda path: _replay(path.parent if name == recording.MANIFEST else path))
+    def also(path: Path, into: Path) -> None:
+        into.mkdir(exist_ok=True)
+        try:
+            rerun_view.write(recording.load(path), into / "x.rrd")
+            exporting.make(path, into / "x.nmea", into / "x.ubx", csv=into / "x.csv")
+        except ValueError as error:
+            if str(path) not in str(error) and "nothing to export" not in str(error):
+                raise
+
+    def command(path: Path) -> list[str]:
+        return _replay(path.parent if name == recording.MANIFEST else path)
+
+    return Target(name, make, damaged, read, command, also)
 
 
 def _gps(name: str, encode: Callable[..., bytes], decode: Callable[[bytes], Any]) -> Target:

@@ -70,11 +70,18 @@ def refused(target: Any, path: Path, *, named: bool) -> bool:
     return False
 
 
+def arguments(target: Any, path: Path) -> list[str]:
+    """Of the command that reads the file; what it writes goes beside it."""
+    told: list[str] = target.command(path)
+    return [*told, "--no-rerun", "--out", str(path.parent / "out")] if told[0] == "replay" else told
+
+
 def command_ends_well(target: Any, path: Path, capsys: Any) -> None:
     """Run the whole command on the file: exit code 0, 1 or 2, and with 2 one line on standard error."""
     out = path.parent / "out"
     with watched(3.0 * LONGEST_S):
-        code = run([*target.command(path), *(["--no-rerun", "--out", str(out)] if "replay" in target.command(path) else [])])
+        target.also(path, out)
+        code = run(arguments(target, path))
     shutil.rmtree(out, ignore_errors=True)
     err = capsys.readouterr().err
     assert code in (0, 1, 2), code
@@ -90,7 +97,10 @@ def hunt(targets: ModuleType, name: str, n: int, folder: Path, capsys: Any) -> d
     at.mkdir()
     path = at / target.name
     target.make(at)
-    assert not refused(target, path, named=True)  # while it is whole
+    target.read(path)  # while it is whole
+    if target.command is not None:  # from here on everything is compiled
+        assert run(arguments(target, path)) in (0, 1, 2)
+        capsys.readouterr()
     found = {"refused": 0, "read": 0}
     for k in range(n):
         path.write_bytes(target.damaged(np.random.default_rng([SEED, NAMES.index(name), k])))
