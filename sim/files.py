@@ -123,6 +123,8 @@ def reading(path: Path | str, refusal: type[ValueError] = ValueError) -> Iterato
         with np.errstate(all="ignore"):
             yield
     except refusal as error:
+        if refusal is ValueError and str(path) not in str(error):  # of anybody
+            raise ValueError(printable(_told(path, error), LONGEST_LINE)) from error
         error.args = (printable(str(error), LONGEST_LINE), *error.args[1:])
         raise
     except Exception as error:  # readers, those of other packages too, raise whatever a damaged file leads them to

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 from autopilot.interface import Mode
 from estimator.interface import Array, HeadingReference, Health
 from estimator.rotation import from_euler
+from sim.drawable import drawable
 from sim.loft import Mesh
 from sim.log import Event, Flight, Log, Phase
 from sim.mesh import Part, aeroplane, geometry_of
@@ -94,14 +95,14 @@ def _encoded(flight: Flight, path: Path) -> bytes:
 
     Made in memory and written by us: Rerun's own writing to a file reports a full disk in its log alone.
     """
-    scene = Scene.of(flight.manifest, flight.release_s, flight.heading_reference)
+    scene, log = Scene.of(flight.manifest, flight.release_s, flight.heading_reference), drawable(flight.log)
     rec = _stream(flight.manifest, digest(flight)[:16])
-    lines = curves(flight.log, flight.heading_reference) if len(flight.log) else {}
+    lines = curves(log, flight.heading_reference) if len(log) else {}
     stream = rec.binary_stream()  # type: ignore[misc] # attached to the class as a function of another module
-    layout = _blueprint(flight.log, flight.release_s, limits(flight.log, lines))
+    layout = _blueprint(log, flight.release_s, limits(log, lines))
     rec.send_blueprint(layout, make_active=False, make_default=True)
     _send_fixed(rec, scene)
-    _send_rows(rec, scene, flight.log, lines, 0)
+    _send_rows(rec, scene, log, lines, 0)
     _send_end(rec, flight)
     try:
         data = stream.read(flush=True, flush_timeout_sec=_FLUSH_S) or b""
@@ -347,7 +348,8 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
         rec.log("world/gps", rr.Points3D(fixes, colors=ESTIMATE, radii=rr.Radius.ui_points(1.5)), static=True)
         reported = rr.GeoPoints(lat_lon=scene.lat_lon_deg(fixes), colors=ESTIMATE, radii=rr.Radius.ui_points(1.5))
         rec.log("map/gps", reported, static=True)
-    wind_e_m_s = log.truth["wind_e_m_s"].mean(axis=0)
+    known = np.isfinite(log.truth["wind_e_m_s"]).all(axis=1)
+    wind_e_m_s = log.truth["wind_e_m_s"][known].mean(axis=0) if known.any() else np.zeros(3)
     speed_m_s = float(np.hypot(wind_e_m_s[0], wind_e_m_s[1]))
     if speed_m_s > 0.1:
         from_deg = float(np.degrees(np.arctan2(-wind_e_m_s[1], -wind_e_m_s[0])) % 360.0)

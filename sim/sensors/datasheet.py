@@ -13,6 +13,7 @@ sheet, or says ``typical`` where that has none.  What a file leaves out is perfe
 """
 
 import math
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -20,6 +21,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, get_type_hints
 
+from sim.files import check, reading
+from sim.files import text as text_of
 from sim.params import near_misses, shown, typed, unit_of
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.air_data import AirspeedParams, BarometerParams
@@ -101,7 +104,8 @@ def load_part(name: str, folder: Path | None = None, files: Mapping[str, str] = 
         return Part(name, "none", summary, "none", devices, MappingProxyType({}))
     if name.endswith(".toml"):
         path = part_path(name, folder)
-        return read_part(str(path), read_text(path, files, "part"))
+        with reading(path):
+            return read_part(str(path), read_text(path, files, "part"))
     known = {_plain(stem): stem for stem in part_names()}
     if _plain(name) not in known:
         hint = near_misses(name, [*known.values(), *_BUILT_IN])
@@ -120,17 +124,20 @@ def read_text(path: Path, files: Mapping[str, str], what: str) -> str:
     if str(path) in files:
         return files[str(path)]
     try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = "no such file" if isinstance(error, FileNotFoundError) else " ".join(str(error).split())
-        raise ValueError(f"{what} {str(path)!r}: {reason}") from None
+        check(path, what)
+    except ValueError as error:
+        if os.path.lexists(path):
+            raise
+        raise ValueError(f"{what} {str(path)!r}: no such file") from error
+    return text_of(path, what)
 
 
 def read_toml(file: str, text: str) -> dict[str, Any]:
     """Contents of the TOML `text`; ValueError that names `file` and where it is wrong."""
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        with reading(file):
+            return tomllib.loads(text)
+    except ValueError as error:  # also of a whole number with thousands of digits
         raise ValueError(f"{file}: not TOML: {' '.join(str(error).split())}") from None
 
 

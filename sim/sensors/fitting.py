@@ -25,6 +25,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from sim.files import reading
 from sim.params import changed, near_misses
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.air_data import AirspeedParams, BarometerParams
@@ -65,7 +66,8 @@ def load_suite(name: str, files: Mapping[str, str] = NO_FILES) -> SuiteParams:
     ValueError      one line: no such suite (with the near misses) or file, or what is wrong in the file
     """
     file, data = _read(name, files)
-    return _fit(file, data, _folder(name), files)
+    with reading(file):
+        return _fit(file, data, _folder(name), files)
 
 
 def own_files(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:

@@ -131,7 +131,7 @@ def test_recording_of_ours_comes_back_bit_for_bit(log, tmp_path):
     """Measured rows and the truth, from the folder or the Parquet file; anything else is refused in one line."""
     flown = Log.empty(N)
     flown.measured[:] = log.rows
-    flown.truth["R_eb"] = np.eye(3)
+    flown.truth["t_s"], flown.truth["R_eb"] = log.rows["t_s"], np.eye(3)
     flown.truth["R_eb"][7] = np.diag([-1.0, -1.0, 1.0])
     folder = recording.save(Flight(flown, 0.02, 0.0, Outcome.COMPLETED, "nose"), tmp_path / "flight")
     for path in (folder, folder / recording.PARQUET):

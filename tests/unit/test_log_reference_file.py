@@ -145,7 +145,7 @@ def test_recording_of_ours_is_a_reference(held, score, tmp_path, of):
     flown = Log.empty(held.n)
     flown.measured["t_s"], flown.measured["dt_s"] = held.t_s, 0.02
     flown.measured["gyro_b_rad_s"], flown.measured["force_b_m_s2"] = held.rate, held.force
-    flown.truth["R_eb"] = held.R_eb
+    flown.truth["t_s"], flown.truth["R_eb"] = held.t_s, held.R_eb
     folder = recording.save(Flight(flown, 0.02, 0.0, Outcome.COMPLETED, "nose"), tmp_path / "flight")
     log = score(folder if of == "folder" else folder / recording.PARQUET)
     assert log.reference.kind == "truth"

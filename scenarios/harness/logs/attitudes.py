@@ -12,6 +12,7 @@ from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import accounts, checks
 from scenarios.harness.logs.quantities import EULER, MATRIX, QUATERNION
 from scenarios.harness.logs.recorded import LogError
+from sim.drawable import is_rotation
 
 NOT_STARTED = "of a filter that had not started"
 NO_ROTATION = "no rotation"
@@ -50,9 +51,7 @@ def attitude(table: Mapping[str, Array]) -> Array | None:
 
 def rotations(R_eb: Array) -> Array:
     """Matrices of shape (N, 3, 3), NaN where one is no rotation."""
-    small = np.where(np.abs(R_eb) < 2.0, R_eb, np.nan)  # the square of what is larger may overflow
-    known = np.abs(small @ small.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) < 0.1
-    known &= np.linalg.det(np.where(known[:, None, None], small, np.eye(3))) > 0.0
+    known = is_rotation(R_eb)
     return np.where(known[:, None, None], R_eb, np.nan)
 
 

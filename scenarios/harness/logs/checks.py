@@ -27,7 +27,7 @@ from scenarios.harness.logs.witnesses import witnesses
 
 LATEST_S = 1.0  # a row later than this is not late: the clock was set, or two logs are in one file
 LONGEST_LOG_S = 5e9  # longer than any clock runs; a timeline in nanoseconds holds no more
-FASTEST_HZ = 20_000.0
+FASTEST_HZ, SHORTEST_S = 20_000.0, 1e-6  # an interval below is none
 BUSIEST_RAD_S = 3.0  # no aeroplane turns faster for half of a log
 FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
@@ -218,7 +218,7 @@ def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> N
         why = f"{usual:g} s from row to row; an inertial unit samples every {1.0 / FASTEST_HZ:g} to {LONGEST_GAP_S} s"
         raise source.refusal(None, "time", why)
     steps = np.concatenate(([usual], steps))
-    unknown = ~((rows["dt_s"] > 0.0) & (rows["dt_s"] <= LONGEST_GAP_S))
+    unknown = ~((rows["dt_s"] >= SHORTEST_S) & (rows["dt_s"] <= LONGEST_GAP_S))
     rows["dt_s"][unknown] = np.where(steps > LONGEST_GAP_S, usual, steps)[unknown]
     expected = np.where(unknown, usual, rows["dt_s"])
     short = gaps.missing(rows["t_s"], expected) & (steps <= LONGEST_GAP_S)

@@ -10,7 +10,6 @@ names of the files, and goes to the estimators that have such a parameter (`Reco
 """
 
 import csv
-import io
 import math
 from pathlib import Path
 from typing import Any, Literal
@@ -127,7 +126,7 @@ def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
     if len(raw) > LARGEST:
         raise LogError(f"{path}: {files.size(len(raw))} of text, more than the {files.size(LARGEST)} that can be read")
     text = raw.decode()
-    lines = csv.reader(io.StringIO(text))
+    lines = csv.reader(text.splitlines())
     header = next(lines, [])
     missing = [name for name in wanted if name not in header]
     if missing:

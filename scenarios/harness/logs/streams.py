@@ -192,7 +192,7 @@ def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[An
 
 def _intervals(t_s: Array, dt_s: Array, name: str, repairs: list[str]) -> Array:
     """Intervals as logged, NaN where the one before was not logged: then the row stands for the time since."""
-    told = (dt_s > 0.0) & (dt_s <= LONGEST_GAP_S)
+    told = (dt_s >= checks.SHORTEST_S) & (dt_s <= LONGEST_GAP_S)
     if not told.any():
         return np.full(len(t_s), np.nan)
     usual_s, steps = float(np.median(dt_s[told])), np.diff(t_s)
