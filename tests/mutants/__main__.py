@@ -47,11 +47,6 @@ def results_so_far(file: Path, again: bool) -> dict[str, dict[str, object]]:
     return {key: row for key, row in found.items() if not again or row["outcome"] == CAUGHT}
 
 
-def key_of(flip: Flip) -> str:
-    """A name for a flip that stays as long as its line does."""
-    return f"{flip.path}: {flip.text} [{flip.start}: {flip.change}]"
-
-
 def drawn(options: argparse.Namespace) -> list[Flip]:
     """The flips that are to be tried."""
     flips = every_flip()
@@ -85,14 +80,14 @@ def main() -> int:
         trees.put(Tree(ROOT, options.folder / f"job-{job}"))
 
     def attempt(flip: Flip) -> None:
-        if key_of(flip) in done:
+        if flip.key in done:
             return
         tree = trees.get()
         try:
-            row = {"key": key_of(flip), **Trial(tree, near, options.cap, same).of(flip)}
+            row = {"key": flip.key, **Trial(tree, near, options.cap, same).of(flip)}
         finally:
             trees.put(tree)
-        done[key_of(flip)] = row
+        done[flip.key] = row
         with kept.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
         sys.stdout.write(f"{len(done):4} {row['outcome']:10} {row['seconds']:6.1f} s  {flip.path}:{flip.line}: ")
@@ -105,7 +100,7 @@ def main() -> int:
     except KeyboardInterrupt:
         pool.shutdown(cancel_futures=True)
         return 130
-    rows = [done[key_of(flip)] for flip in flips]
+    rows = [done[flip.key] for flip in flips]
     (options.folder / "report.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     sys.stdout.write(table(rows))
     judged = [row for row in rows if row["outcome"] != EQUIVALENT]

@@ -6,9 +6,10 @@ together with + or %), and paths put together with /.
 """
 
 import ast
-import random
+import hashlib
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -30,12 +31,18 @@ class Flip:
     end: int
     old: str
     new: str
-    text: str  # the line, for people and for the list of the equivalent ones
+    text: str  # the line
+    nth: int = 0  # of this change in lines that read the same
 
     @property
     def change(self) -> str:
-        """What a person reads, and a key that survives edits elsewhere in the file."""
-        return f"{self.old or '(none)'} -> {self.new or '(none)'}"
+        """What a person reads."""
+        return f"{self.old} -> {self.new}"
+
+    @property
+    def key(self) -> str:
+        """A name that stays as long as the line does, whatever is edited around it."""
+        return f"{self.path}: {self.text} [{self.change}, {self.nth}]"
 
     def applied(self, source: bytes) -> bytes:
         """The source with the flip.  ValueError where it is another source."""
@@ -79,7 +86,12 @@ def flips_of(path: str, source: bytes) -> list[Flip]:
             sides = [node.left, *node.comparators]
             for left, operator, right in zip(sides, node.ops, sides[1:], strict=False):
                 found.append(flip(offset(*_end(left)), offset(*_start(right)), operator))
-    return sorted((f for f in found if f), key=lambda f: f.start)
+    seen: Counter[str] = Counter()
+    numbered = []
+    for found_flip in sorted((f for f in found if f), key=lambda f: f.start):
+        numbered.append(replace(found_flip, nth=seen[found_flip.key]))
+        seen[found_flip.key] += 1
+    return numbered
 
 
 def every_flip(root: Path = ROOT) -> list[Flip]:
@@ -92,10 +104,8 @@ def every_flip(root: Path = ROOT) -> list[Flip]:
 
 
 def sample(flips: list[Flip], number: int, seed: int) -> list[Flip]:
-    """So many of them, drawn without regard to anything; the first n are the same for any larger number."""
-    drawn = list(flips)
-    random.Random(seed).shuffle(drawn)
-    return drawn[:number]
+    """So many of them, drawn without regard to anything; an edit elsewhere draws no others, a larger number more."""
+    return sorted(flips, key=lambda flip: hashlib.sha256(f"{seed} {flip.key}".encode()).digest())[:number]
 
 
 def _start(node: ast.expr) -> tuple[int, int]:
