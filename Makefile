@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help venv fly test proofs lint clean
+.PHONY: help venv fly test proofs fuzz mutants lint clean
 
 help:  ## what can be made
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
@@ -23,9 +23,6 @@ $(STAMP): pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable . --group dev
 	@touch $@
 
-fuzz: venv  ## search on where the tests draw examples: others each time, twenty times as many
-	HYPOTHESIS_PROFILE=explore $(BIN)/pytest -n $(WORKERS) -m hypothesis
-
 fly: venv  ## set up, and fly the hand launch
 	@$(BIN)/wingslevel fly hand_launch
 
@@ -40,6 +37,12 @@ test: lint  ## set up, lint, and run all tests
 
 proofs: venv  ## the long proofs: hundreds of command lines, kills and bent files
 	$(BIN)/pytest -n $(WORKERS) -m long
+
+fuzz: venv  ## search on where the tests draw examples: others each time, twenty times as many
+	HYPOTHESIS_PROFILE=explore $(BIN)/pytest -n $(WORKERS) -m hypothesis
+
+mutants: venv  ## are the tests tested? 200 flipped signs and comparisons, one by one; takes hours, goes on where it was
+	nice $(BIN)/python tests/mutants --number 200 --seed 1 --jobs $(WORKERS)
 
 clean:  ## remove what was made here, the virtual environment included
 	rm -rf $(VENV) flights dist build .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -237,7 +237,7 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
         climb_missing_m_s = climb_m_s + sinking_m_s if math.isfinite(missing_m) else 0.0
     else:
         climb_missing_m_s = climb_m_s
-    if climb_m_s == most_m_s:  # too slow: what is missing is not lift
+    if climb_m_s == most_m_s or most_m_s < 0.0:  # too slow: what is missing is not lift
         climb_missing_m_s = min(climb_missing_m_s, 0.0)
     learns = s.airspeed_known and math.isfinite(missing_m) and abs(given_m_s - energy_m_s) < 1e-6
     learn_trim(climb_missing_m_s, energy_m_s + sinking_m_s if learns else 0.0, s, e, dt_s)

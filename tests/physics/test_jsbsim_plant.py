@@ -1,6 +1,7 @@
 """The JSBSim plant against physics that JSBSim does not work out: rest, fall, energy, Galileo; and its contract."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -270,6 +271,27 @@ def test_accelerometer_in_the_push_reads_the_push_and_gravity():
     pushed = rows[rows["phase"] == Phase.THROWN]
     expected = 27.0 - G_M_S2 * pushed["R_eb"][:, 2, 0]
     np.testing.assert_allclose(pushed["imu_force_b_m_s2"][:, 0], expected, rtol=0, atol=0.03)
+
+
+def test_push_brings_the_speed_and_the_rates_evenly_from_rest_to_release():
+    """After the time t of the push: t times 27 m/s2 along the nose, and the part t / 0.3 s of the way to its rates."""
+    throw = replace(THROW, release_rate_b_rad_s=(1.5, -1.0, 0.8), sway_rad_s=(0.0, 0.0, 0.0))
+    rows, _, _ = flown(JsbsimPlant(start=throw), 1.3, lambda _t: NEUTRAL)
+    pushed = rows[rows["phase"] == Phase.THROWN]
+    assert len(pushed) == 15
+    into_s = 0.02 * np.arange(1, 16)
+    # The hand answers to forces and moments of one step before, and what they have changed by is left over.
+    np.testing.assert_allclose(
+        pushed["omega_b_rad_s"], np.outer(into_s / 0.3, throw.release_rate_b_rad_s), rtol=0, atol=0.01
+    )
+    # The gyro's mean is that of four steps of a straight line, each with the rate that it ends with: half a step ahead.
+    np.testing.assert_allclose(
+        pushed["imu_omega_b_rad_s"],
+        np.outer((into_s - 0.01) / 0.3, throw.release_rate_b_rad_s),
+        rtol=0,
+        atol=0.5 * 0.005 / 0.3 * 1.5 + 0.01,
+    )
+    np.testing.assert_allclose(np.linalg.norm(pushed["v_e_m_s"], axis=1), 27.0 * into_s, rtol=5e-3, atol=0.01)
 
 
 def test_stirred_flight_finer_physics_converges():

@@ -65,7 +65,8 @@ def test_heading_error_any_attitude_equals_the_wrapped_course_difference(flown, 
     """Cross and dot product of the nose vector give the sine and cosine of the difference, also inverted."""
     north, east = direction_of_travel(nose(flown, pitch, roll), UNKNOWN, row_of(valid=0), state(), 0, record())
     sine, cosine = heading_error(north, east, math.cos(wanted), math.sin(wanted))
-    np.testing.assert_allclose(wrapped(math.atan2(sine, cosine) - (wanted - flown)), 0.0, rtol=0, atol=1e-9)
+    # The nose is 0.07 long over the ground at the steepest: 4 eps of a matrix over that, and some of the angles.
+    np.testing.assert_allclose(wrapped(math.atan2(sine, cosine) - (wanted - flown)), 0.0, rtol=0, atol=1e-13)
 
 
 @given(error=angle)
@@ -94,7 +95,8 @@ def test_direction_of_travel_nose_with_wind_is_the_wind_triangle(heading, blows_
     wind = speed * np.array([math.cos(blows_to), math.sin(blows_to), 0.0])
     over_ground = CRUISE_M_S * np.exp(1j * heading) + speed * np.exp(1j * blows_to)
     north, east = direction_of_travel(nose(heading), wind, row_of(), state(), 1, record())
-    np.testing.assert_allclose(north + 1j * east, over_ground / abs(over_ground), rtol=0, atol=1e-9)
+    # 3.6 m/s are left of 12.6 against 9: some eps of the sum of both over that.
+    np.testing.assert_allclose(north + 1j * east, over_ground / abs(over_ground), rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("speed", [13.0, 20.0, 40.0])

@@ -75,7 +75,7 @@ def test_roll_error_level_nose_equals_sine_or_saturates(roll, yaw, bank):
     if abs(abs(missing) - math.pi / 2) < 1e-9 or abs(abs(missing) - math.pi) < 1e-9:
         return
     expected = math.sin(missing) if abs(missing) < math.pi / 2 else math.copysign(1.0, missing)
-    np.testing.assert_allclose(roll_error(attitude(roll, 0.0, yaw), STILL, bank, 1.0), expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(roll_error(attitude(roll, 0.0, yaw), STILL, bank, 1.0), expected, rtol=0, atol=ROUND_OFF)
 
 
 @pytest.mark.parametrize("degrees", [95.0, 135.0, 179.0, -95.0, -135.0, -179.0])
@@ -199,7 +199,7 @@ def test_rate_demand_inverted_is_upright_in_axes_turned_half_round_the_nose(roll
         return  # exactly opposite: either way is right
     upright = rate_demand(R, still, bank, nose, 1.0, CRUISE_M_S, record())
     inverted = rate_demand(turned, still, bank, nose, -1.0, CRUISE_M_S, record())
-    np.testing.assert_allclose(inverted, (upright[0], -upright[1], -upright[2]), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(inverted, (upright[0], -upright[1], -upright[2]), rtol=0, atol=ROUND_OFF)
 
 
 @given(bank=st.floats(-1.0, 1.0), yaw=angle)
@@ -208,7 +208,7 @@ def test_rate_demand_inverted_turn_goes_the_same_way_over_the_ground(bank, yaw):
     R = attitude(math.pi + bank, 0.0, yaw)
     demand = np.array(rate_demand(R, STILL, bank, 0.0, -1.0, CRUISE_M_S, record()))
     expected = [0.0, 0.0, G_M_S2 * math.tan(bank) / CRUISE_M_S]
-    np.testing.assert_allclose(R @ demand, expected, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(R @ demand, expected, rtol=0, atol=ROUND_OFF)
 
 
 def test_elevator_inverted_level_is_down_elevator_for_two_g_less():

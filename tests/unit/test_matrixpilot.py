@@ -146,6 +146,36 @@ def test_wind_is_found_from_pairs_of_reports_and_noses():
         np.testing.assert_allclose(state["wind_e_m_s"][0], expected, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("from_deg", range(0, 360, 45))
+@pytest.mark.parametrize("yaw_error_deg", [-50.0, 0.0, 20.0])
+def test_wind_from_any_direction_is_found_whatever_the_error_of_yaw(from_deg, yaw_error_deg):
+    """The turn about down between the nose believed and the air is unknown and found with the wind: as exactly."""
+    wind = np.array([-6.0 * math.cos(math.radians(from_deg)), -6.0 * math.sin(math.radians(from_deg)), 0.3])
+    state = MatrixPilot().snapshot()
+    for pair in range(61):
+        R = from_euler(-0.4, 0.05, math.radians(-70.0 * pair))
+        state["R_eb"] = Rotation.from_euler("z", yaw_error_deg, degrees=True).as_matrix() @ R
+        state["v_e_m_s"] = 13.0 * R[:, 0] + wind
+        call_learn_wind(state)
+    np.testing.assert_allclose(state["wind_e_m_s"][0], wind * (1.0 - (15.0 / 16.0) ** 60), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("from_deg", range(0, 360, 45))
+def test_wind_from_any_direction_is_found_in_circles(from_deg):
+    """Two minutes of circling at 20 degrees of bank, yaw 30 degrees off at first: the wind within a tenth of it."""
+    bank, speed_m_s = math.radians(20.0), 13.0
+    wind = 5.0 * np.array([-math.cos(math.radians(from_deg)), -math.sin(math.radians(from_deg)), 0.0])
+    turn_rad_s = G * math.tan(bank) / speed_m_s
+    R_be = from_euler(bank, 0.0, 0.0).T
+    rows = motion(120.0, R_be @ [0.0, 0.0, turn_rad_s], R_be @ [0.0, turn_rad_s * speed_m_s, -G])
+    heading = turn_rad_s * rows["t_s"]
+    nose = np.stack([np.cos(heading), np.sin(heading), 0.0 * heading], axis=-1)
+    rows = with_gps(rows, speed_m_s * nose + wind)
+    estimator = started(MatrixPilotParams(late_by_one_report=False), R_eb=from_euler(bank, 0.0, math.radians(30.0)))
+    found = estimator.replay(rows)["wind_e_m_s"][-1]
+    np.testing.assert_allclose(found, wind, rtol=0, atol=0.5)
+
+
 def test_wind_is_not_measured_before_the_nose_has_turned():
     """Noses 20 degrees apart (a change of 0.35) tell nothing; the pair waits for its second half."""
     state = MatrixPilot().snapshot()
