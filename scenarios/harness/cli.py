@@ -15,7 +15,6 @@ import typer
 from scenarios.harness import cli_values as complete
 from scenarios.harness import console, guard
 from scenarios.harness.cli_options import (
-    FLIGHT_TIMEOUT_S,
     AircraftOption,
     AutopilotOption,
     CalibrationOption,
@@ -49,6 +48,7 @@ from scenarios.harness.cli_options import (
     fitted,
     given,
     names_of,
+    time_limit,
 )
 from scenarios.harness.cli_reports import attempt, check_file, losses, refusal, reporting, usage, write
 from scenarios.harness.cli_values import Commands, number_in, whole_in
@@ -153,7 +153,7 @@ def fly(
     ] = None,
     set_: SetOption = None,
     withhold: WithholdOption = None,
-    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
+    flight_timeout: FlightTimeoutOption = None,
     out: Annotated[Path, typer.Option(help="Folder for the recording.")] = FLIGHTS,
     no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Watch it in the Rerun viewer, in real time.")] = False,
@@ -169,7 +169,7 @@ def fly(
     with reporting(json_) as report:
         with usage():
             changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
-            limit_s = None if live else flight_timeout
+            limit_s = time_limit(flight_timeout, live=live)
             flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web, limit_s=limit_s)
         report(flown.to_json())
         single.tell(flown)  # last: a reader who closes the pipe loses no report
@@ -200,7 +200,7 @@ def check(
     set_: SetOption = None,
     withhold: WithholdOption = None,
     workers: WorkersOption = None,
-    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
+    flight_timeout: FlightTimeoutOption = None,
     ledger: LedgerOption = None,
     junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Write JUnit XML.")] = None,
     markdown: MarkdownOption = None,
@@ -224,7 +224,9 @@ def check(
             kept = None if ledger is None else Ledger(ledger)
             guard.stage("while it judged", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
-                run = gate.fly_all(tasks, workers or crew.processors(), advance, limit_s=flight_timeout, ledger=kept)
+                run = gate.fly_all(
+                    tasks, workers or crew.processors(), advance, limit_s=time_limit(flight_timeout), ledger=kept
+                )
         write(junit, run.verdict.to_junit)
         write(markdown, run.verdict.to_markdown)
         report(run.to_json())
@@ -281,7 +283,7 @@ def compare(
     set_: SetOption = None,
     withhold: WithholdOption = None,
     workers: WorkersOption = None,
-    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
+    flight_timeout: FlightTimeoutOption = None,
     picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it, as PNG, SVG or PDF.")] = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
@@ -302,7 +304,9 @@ def compare(
             plan = comparing.prepare(scenario, names_of(estimators, "--estimators"), gate.parse_seeds(seeds), changes)
             guard.stage("while it compared", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
-                compared = comparing.fly(plan, workers or crew.processors(), advance, limit_s=flight_timeout)
+                compared = comparing.fly(
+                    plan, workers or crew.processors(), advance, limit_s=time_limit(flight_timeout)
+                )
         if picture is not None:
             from scenarios.harness import compare_picture
 
@@ -324,7 +328,7 @@ def claims(
         str | None, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7. [default: of each claim]")
     ] = None,
     workers: WorkersOption = None,
-    flight_timeout: FlightTimeoutOption = FLIGHT_TIMEOUT_S,
+    flight_timeout: FlightTimeoutOption = None,
     list_only: Annotated[bool, typer.Option("--list", help="Say what claims there are, and measure none.")] = False,
     pictures: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Draw them. [default: images beside the Markdown]")
@@ -354,7 +358,7 @@ def claims(
                     workers or crew.processors(),
                     advance,
                     drawn=folder is not None,
-                    limit_s=flight_timeout,
+                    limit_s=time_limit(flight_timeout),
                 )
         claim_report.write_all(findings, markdown, folder)
         report(findings.to_json())

@@ -99,11 +99,11 @@ WorkersOption = Annotated[
     typer.Option(metavar="N", help="Processes; as many as processors by default.", parser=whole_in(1, MOST_WORKERS)),
 ]
 FlightTimeoutOption = Annotated[
-    float,
+    float | None,
     typer.Option(
         "--flight-timeout",
         metavar="S",
-        help="Longest a flight may take, by the clock on the wall.",
+        help="Longest a flight may take, by the clock on the wall. [default: 600]",
         parser=number_in(0.001, 1e6, "s"),
     ),
 ]
@@ -158,6 +158,11 @@ WithholdOption = Annotated[
         help="Properties of the instruments that nobody is given; all for all of them.",
     ),
 ]
+
+
+def time_limit(flight_timeout: float | None, *, live: bool = False) -> float | None:
+    """What ``--flight-timeout`` says; where it says nothing, none for a flight that is watched as it is flown."""
+    return flight_timeout if flight_timeout is not None or live else FLIGHT_TIMEOUT_S
 
 
 def changes_of(assignments: list[str] | None) -> dict[str, Any]:

@@ -143,6 +143,7 @@ def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
         return
     from sim.recording import RecordingError, replacing
 
+    come_home()
     made = content()
     data = made.encode("utf-8") if isinstance(made, str) else made
     target = path.resolve()  # what a link points to is replaced, not the link
@@ -170,18 +171,27 @@ def write_figure(path: Path, figure: "Figure", dpi: int) -> None:
 _lost: list[str] | None = None  # what could not be written inside `losses`
 
 
+_home: str | None = None  # where the command was begun
+
+
+def come_home() -> None:
+    """Go back to the working directory of the command: flight code may have left it, and paths are relative to it."""
+    if _home is not None:
+        os.chdir(_home)
+
+
 @contextmanager
 def losses() -> Iterator[list[str]]:
     """Inside the block a report that cannot be written does not end the command: it is told, and the rest goes on.
 
     What was measured is not lost with the first file that finds no room.  Gives the list of the lines told.
     """
-    global _lost
-    before, _lost = _lost, []
+    global _lost, _home
+    before, _lost, _home = (_lost, _home), [], os.getcwd()
     try:
         yield _lost
     finally:
-        _lost = before
+        _lost, _home = before
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from scenarios.harness import console
+from scenarios.harness import cli_reports, console
 from scenarios.harness.config import LARGEST_SEED
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.ledger import Ledger
@@ -173,7 +173,10 @@ def fly_all(
     missing = [i for i in range(len(tasks)) if i not in done]
 
     def keep(k: int, verdict: FlightVerdict) -> None:
-        if ledger is not None:
+        if ledger is None:
+            return
+        cli_reports.come_home()
+        with cli_reports.attempt():  # a full disk costs the ledger its file, and no flight
             ledger.keep(tasks[missing[k]].key, verdict)
 
     flown = fly_each(

@@ -63,6 +63,7 @@ class _Heard:
     watched: str = ""
     deadline_s: float | None = None
     timed_out = False
+    unwritten = ""  # why what was published could not be written
 
 
 lost: dict[str, Lost] = {}
@@ -86,6 +87,9 @@ def guarded(command: Callable[[], int]) -> int:
         return command()
     while True:
         heard, ended = _run(command)
+        if heard.unwritten:
+            sys.stderr.write(f"wingslevel: cannot write the JSON to standard output: {heard.unwritten}\n")
+            return max(heard.done or 0, USAGE)
         if heard.done is not None:
             return heard.done
         if heard.watched and heard.watched not in lost:
@@ -230,15 +234,25 @@ def _take(line: bytes, token: str, heard: _Heard) -> None:
     except (ValueError, TypeError, KeyError):
         return
     if "out" in frame:
-        with contextlib.suppress(OSError):
-            sys.stdout.write(frame["out"])
-            sys.stdout.flush()
+        _write(frame["out"], heard)
     if "stage" in frame:
         heard.stage, heard.code = frame["stage"], frame["code"]
     if "watched" in frame:
         heard.watched, limit_s = frame["watched"], frame["limit_s"]
         heard.deadline_s = None if limit_s is None else time.monotonic() + limit_s
     heard.done = frame.get("done", heard.done)
+
+
+def _write(text: str, heard: _Heard) -> None:
+    """Write `text` to standard output; a reader that has gone away is no fault."""
+    data = text.encode("utf-8", "backslashreplace")
+    try:
+        while data:
+            data = data[os.write(1, data) :]
+    except BrokenPipeError:
+        return
+    except OSError as error:
+        heard.unwritten = error.strerror or type(error).__name__
 
 
 def _how(status: int) -> str:

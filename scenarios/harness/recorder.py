@@ -17,6 +17,7 @@ def record(flight: Flight, into: Path, name: str, *, rerun: bool) -> Path | None
     -------
     The folder; None where it could not be written.  Without the Rerun recording, where that alone could not be.
     """
+    cli_reports.come_home()
     with cli_reports.attempt():
         with recording.new_folder(into, name) as draft:
             recording.save(flight, draft.path)

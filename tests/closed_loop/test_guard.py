@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from scenarios.harness.flight import fly_scenario
+from scenarios.harness.registry import find
+
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = [sys.executable, "-c", "from scenarios.harness.guard import main; main()"]
 OWN = """
@@ -79,6 +82,13 @@ class Slow:
 QUICK = ("--set", "duration_s=2", "--no-rerun", "--json", "-")
 
 
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """The kernels that the commands need."""
+    fly_scenario(find("crosswind"), {"duration_s": 1.0})
+    fly_scenario(find("crosswind"), {"duration_s": 1.0}, estimator="gyro_only")
+
+
 @pytest.fixture
 def here(tmp_path: Path) -> Path:
     """A folder with estimators that are not to be trusted."""
@@ -94,7 +104,7 @@ def environment() -> dict[str, str]:
 def wingslevel(here: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """A command, run to its end."""
     return subprocess.run(
-        [*COMMAND, *arguments], cwd=here, env=environment(), text=True, capture_output=True, timeout=120
+        [*COMMAND, *arguments], cwd=here, env=environment(), text=True, capture_output=True, timeout=300
     )
 
 
@@ -191,3 +201,24 @@ def test_bench_estimator_that_ends_its_process_is_exit_code_1(here: Path) -> Non
     done = wingslevel(here, "bench", "--estimator", "own.py:Leaves", "--seconds", "2", "--repeats", "3", "--json", "-")
     assert done.returncode == 1
     assert "ended by itself (exit code 0)" in json.loads(done.stdout)["failure"]
+
+
+def test_fly_json_on_a_full_device_is_said_and_no_pass(here: Path) -> None:
+    """What cannot be written makes the command fail."""
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full")
+    arguments = ["fly", "crosswind", "--estimator", "gyro_only", *QUICK]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [*COMMAND, *arguments], cwd=here, env=environment(), stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 2
+    assert "cannot write the JSON to standard output" in done.stderr
+
+
+def test_fly_estimator_that_leaves_the_working_directory_loses_no_report(here: Path) -> None:
+    """Paths are those of the person who typed them."""
+    source = "import os\nfrom own import *\nclass Goes(Stays):\n    def __init__(self):\n        os.chdir('/')\n"
+    (here / "goes.py").write_text(source, encoding="utf-8")
+    wingslevel(here, "fly", "crosswind", "--estimator", "goes.py:Goes", *QUICK[:-1], "v.json")
+    assert Path(here, json.loads((here / "v.json").read_text())["recording"]).is_dir()
