@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from estimator.instruments import Known, to_json
+from estimator.interface import HeadingReference
 from scenarios.harness.aboard import flight_code, instruments_of, require_heard, with_calibration
 from scenarios.harness.air_config import build_air
 from scenarios.harness.config import (
@@ -104,11 +105,10 @@ def fly_config(
     the estimator was given, or has learnt, its ``scenario_fault`` what went wrong in the scenario's own functions.
     """
     config = with_calibration(resolve(config), maker)
-    rates = config.rates.build()
-    code = flight_code(config, maker)
+    rates, faults = config.rates.build(), [parse_fault(fault) for fault in config.faults]
+    (estimator, known), (pilot, _) = code = flight_code(config, maker)
     if not lenient:
         require_heard(config, code)
-    (estimator, known), (pilot, _) = code
     manifest = {
         "scenario": scenario.name,
         "seed": config.seed,
@@ -120,11 +120,8 @@ def fly_config(
     except ScriptFailed as problem:
         if not kept:
             raise
-        reference, outcome = heading_reference_of(estimator), Outcome.SCENARIO_FAILED
-        events = (Event(0.0, str(problem), "error"),)
-        return Flight(Log.empty(0), rates.dt_s, 0.0, outcome, reference, str(problem), events, manifest)
+        return _unflown(str(problem), rates, heading_reference_of(estimator), manifest)
     plant = plant_of(config, rates)
-    faults = [parse_fault(fault) for fault in config.faults]
     sensors = suite_params(config.suite, config.sensors, config.files)
     airborne = isinstance(config.start, InFlightStart)
     on_ground = sample_at_rest(sensors, rates, config.seed, config.flight) if airborne else None
@@ -141,6 +138,12 @@ def fly_config(
         watch=watch,
     )
     return _told(flown, scenario, faults, estimator, known)
+
+
+def _unflown(why: str, rates: Rates, reference: HeadingReference, manifest: dict[str, Any]) -> Flight:
+    """A flight that did not begin, for its script raised."""
+    events = (Event(0.0, why, "error"),)
+    return Flight(Log.empty(0), rates.dt_s, 0.0, Outcome.SCENARIO_FAILED, reference, why, events, manifest)
 
 
 def _told(

@@ -166,18 +166,11 @@ def replay(
         failure = failure or str(failed)
     judged = judged_rows(log, window, first)
     scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
+    ns_per_update = math.nan if failure else ns_per_update
     return Replayed(
-        spec.rpartition(":")[2],
-        reference,
-        flown,
-        first,
-        ns_per_update if not failure else math.nan,
-        said.rejected,
-        scores,
-        failure,
-        said.known,
+        spec.rpartition(":")[2], reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
         said.refused,
-    )
+    )  # fmt: skip
 
 
 def gone(spec: str, failure: str) -> Replayed:

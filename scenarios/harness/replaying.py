@@ -91,10 +91,8 @@ def run(
     ValueError      one line: log, reference, map, estimator, parameter or folder; nothing has been written then
     """
     window, params = window or Window(), params or {}
-    if not names:
-        raise ValueError("--estimator: name at least one")
-    if len({name.rpartition(":")[2] for name in names}) < len(names):
-        raise ValueError(f"--estimator {','.join(names)}: name each one once")
+    if not names or len({name.rpartition(":")[2] for name in names}) < len(names):
+        raise ValueError(f"--estimator {','.join(names)}: name at least one, name each one once")
     settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
     of_each, withheld = shared_settings(names, settings), property_names(withheld)
     for name in names:
