@@ -104,6 +104,7 @@ class Outcome(StrEnum):
     DIVERGED = "diverged"
     ESTIMATOR_FAILED = "estimator_failed"
     AUTOPILOT_FAILED = "autopilot_failed"
+    SCENARIO_FAILED = "scenario_failed"  # its script raised for this flight; nothing was flown
     TIMED_OUT = "timed_out"  # took longer than the wall-clock limit
     WORKER_DIED = "worker_died"  # the process that flew it is gone; nothing of it is recorded
     INTERRUPTED = "interrupted"

@@ -83,6 +83,11 @@ def check() -> None:
         raise TimedOut
 
 
+def heard() -> tuple[float | None, bool]:
+    """When the last signal that ends the command was heard, and whether the time is up: to compare around a block."""
+    return _heard.at_s, _heard.time_up
+
+
 def _interrupt(_number: int, _frame: FrameType | None) -> None:
     now_s = time.monotonic()
     if _heard.at_s is not None and now_s - _heard.at_s < ECHO_S:

@@ -1,6 +1,7 @@
 """Text from other people's code and files, made safe to print: one line, no control characters, valid UTF-8."""
 
 LONGEST = 400  # characters of a message; the rest is counted
+_NAME_OF_CLASS = type.__dict__["__name__"]
 
 
 def printable(text: str, longest: int = LONGEST) -> str:
@@ -16,10 +17,17 @@ def printable(text: str, longest: int = LONGEST) -> str:
 def described(error: BaseException) -> str:
     """An exception on one printable line, ``ValueError: its text``; one that cannot say what it is says so."""
     try:
-        text = str(error)
+        text = str.__str__(str(error))  # a plain one: str() may hand on a text whose methods are anyone's
+        if str(type(error).__module__).startswith("numba"):
+            text = text.partition("\n")[0]  # the first line of numba's says enough
     except BaseException as fault:  # it is anyone's class
-        return f"{printable(type(error).__name__)}: no message (its __str__ raises {printable(type(fault).__name__)})"
-    return f"{printable(type(error).__name__)}: {printable(text) or 'no message'}"
+        return f"{class_name(error)}: no message (its __str__ raises {class_name(fault)})"
+    return f"{class_name(error)}: {printable(text) or 'no message'}"
+
+
+def class_name(value: object) -> str:
+    """Name of the class of `value`, whatever its metaclass says."""
+    return printable(_NAME_OF_CLASS.__get__(type(value)))
 
 
 def _escaped(character: str) -> str:

@@ -106,7 +106,7 @@ def test_reset_that_raises_ends_the_flight_before_it_began(who):
 
     flight = flown(**{who: Broken()})
     assert flight.outcome == f"{who}_failed"
-    assert flight.message == "Broken at 0.00 s: RuntimeError: no memory card"
+    assert flight.message == "Broken at 0.00 s: RuntimeError: no memory card (test_loop.py, line 105, in reset)"
     assert len(flight.log) == 0
 
 
