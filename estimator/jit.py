@@ -7,6 +7,7 @@ the project, so that any edit compiles anew and nothing else does.
 
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Callable
 from functools import cache
@@ -47,6 +48,14 @@ def cache_dir() -> Path:
     return here
 
 
+def cache_of(module: str) -> Path:
+    """Directory of the compiled kernels of `module`: of somebody else's, one of its own.
+
+    numba keeps the name of the module with what it caches, and the same file may be loaded under several.
+    """
+    return cache_dir() if module.partition(".")[0] in _PACKAGES else cache_dir() / "others" / re.sub(r"\W", "_", module)
+
+
 def is_cold() -> bool:
     """True where no kernel of these sources has been compiled yet: the first flight will take seconds."""
     return not any(cache_dir().rglob("*.nbi"))
@@ -71,7 +80,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 def _compile(function: Callable[..., Any], **options: Any) -> Any:
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_dir())
+    config.CACHE_DIR = str(cache_of(function.__module__ or ""))
     try:
         return numba.njit(cache=True, error_model="numpy", **options)(function)
     except RuntimeError:  # no place to cache in (a function typed at a prompt, a read-only home)

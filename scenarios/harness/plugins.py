@@ -14,12 +14,12 @@ named like a property are set to it.  Only ``update`` is required.
 """
 
 import importlib
-import importlib.util
 import inspect
-import sys
+import numbers
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import is_dataclass
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -27,9 +27,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
-from estimator.instruments import Instruments, Known
+from estimator.instruments import Instruments, Known, property_value
+from scenarios.harness.own_files import also_import_from, module_of_file
+from sim.blame import Refused, home_of, place_of, shown, theirs
 from sim.params import changed, dotted_fields
 from sim.params import near_misses as near_misses
+from sim.wording import class_name, described, printable
 
 if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
     from autopilot.interface import Autopilot
@@ -50,12 +53,18 @@ class _Kind(NamedTuple):
     arguments: tuple[str, ...]
 
 
+_NOT_SET = {"params", "instruments", "self"}  # arguments of constructors that are no settings
 _ESTIMATOR = _Kind("estimator", _ALL_ESTIMATORS, "wingslevel.estimators", ("measurements",))
 _AUTOPILOT = _Kind("autopilot", AUTOPILOTS, "wingslevel.autopilots", ("estimate", "measurements", "setpoint"))
 
 
 class PluginError(ValueError):
     """Flight code that cannot be found, loaded or used; the message is one line."""
+
+
+def _refusing(kind: _Kind, spec: "str | Maker", home: str = "") -> theirs:
+    """A block in which flight code named `spec` runs: what it raises is a PluginError that names it."""
+    return theirs(lambda line: PluginError(f"{kind.word} {maker_name(spec)!r}: {line}"), home)
 
 
 def estimators() -> dict[str, str]:
@@ -77,7 +86,7 @@ def load_estimator(spec: str) -> "AttitudeEstimator":
         In one line: nothing of that name (with the near misses), code that cannot be imported or constructed, no
         ``update(measurements)``, or a ``heading_reference`` that is neither "course" nor "nose".
     """
-    estimator: AttitudeEstimator = _load(_ESTIMATOR, spec)
+    estimator: AttitudeEstimator = _made(_ESTIMATOR, spec, _find(_ESTIMATOR, spec), {})
     _check_reference(spec, estimator)
     return estimator
 
@@ -117,9 +126,23 @@ def parameters_of(spec: str) -> set[str]:
     ------
     PluginError      as for `load_estimator`
     """
-    params = getattr(load_estimator(spec), "params", None)
-    named = set(dotted_fields(params)) if is_dataclass(params) else set()
-    return named | (_arguments(_find(_ESTIMATOR, spec)) - {"params", "instruments", "self"})
+    params = params_of(spec, load_estimator(spec))
+    named = set(dotted_fields(params)) if params is not None else set()
+    return named | (_arguments(_ESTIMATOR, spec, _find(_ESTIMATOR, spec)) - _NOT_SET)
+
+
+def params_of(spec: "str | Maker", estimator: object) -> Any:
+    """The parameter dataclass of `estimator`, made of `spec`; None where it has none, PluginError where it raises."""
+    return _params(_ESTIMATOR, spec, estimator)
+
+
+def _params(kind: _Kind, spec: "str | Maker", code: object) -> Any:
+    with _refusing(kind, spec, home_of(code)):
+        params = getattr(code, "params", None)
+        if isinstance(params, type) or not is_dataclass(params):
+            return None
+        dotted_fields(params)  # anyone's class: its fields may raise
+        return params
 
 
 def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -175,19 +198,24 @@ def _equipped(
     aboard = instruments.changed({name: value for name, value in settings.items() if name in instruments})
     values = {name: known.value for name, known in aboard.given.items()}
     maker = _find(kind, spec) if isinstance(spec, str) else spec
-    asked = _arguments(maker)
-    code = _load(kind, spec, **also, **values, instruments=aboard)
+    asked = _arguments(kind, spec, maker)
+    of_constructor = {name: value for name, value in settings.items() if name in asked - {*_NOT_SET, *also}}
+    offered = {**also, **values, "instruments": aboard, **of_constructor}
+    code = _made(kind, spec, maker, offered)
     known = {name: aboard[name] for name in aboard if name in asked or "instruments" in asked}
-    params = getattr(code, "params", None)
-    if is_dataclass(params) and inspect.isclass(maker) and (settings or _takes_params(maker, {*also, *aboard})):
-        places = _places(params, aboard)
-        known |= {name: aboard[name] for name in aboard if name in places}
-        changes = {place: values[name] for name, place in places.items() if name in values} | dict(settings)
-        code = _with_params(kind, spec, code, changes, also)
-    elif unheard := [name for name in settings if name not in asked]:
+    params = _params(kind, spec, code)
+    if params is not None and inspect.isclass(maker):
+        fields = set(dotted_fields(params))
+        changes = {name: value for name, value in settings.items() if name not in of_constructor or name in fields}
+        if changes or _takes_params(maker, {*also, *aboard}):
+            places = _places(params, aboard)
+            known |= {name: aboard[name] for name in aboard if name in places}
+            given = {place: values[name] for name, place in places.items() if name in values}
+            return Equipped(_with_params(kind, spec, params, given | changes, maker, offered) or code, known)
+    elif unheard := [name for name in settings if name not in of_constructor]:
         raise ValueError(
-            f"{kind.word} {_name_of(spec)!r} has no parameter {unheard[0]!r}: its constructor does not take it, and it "
-            "has no dataclass params"
+            f"{kind.word} {maker_name(spec)!r} has no parameter {unheard[0]!r}: its constructor does not take it, and "
+            "it has no dataclass params" + ("" if params is None else " that can be set: what a function made is kept")
         )
     return Equipped(code, known)
 
@@ -209,39 +237,103 @@ def _places(params: Any, names: Iterable[str]) -> dict[str, str]:
     }
 
 
-def _with_params(kind: _Kind, spec: "str | Maker", code: Any, changes: Mapping[str, Any], also: dict[str, Any]) -> Any:
-    """Flight code like `code` with `changes` of its parameters; ValueError for one that it refuses."""
+def _with_params(
+    kind: _Kind, spec: "str | Maker", params: Any, changes: Mapping[str, Any], maker: Maker, offered: Mapping[str, Any]
+) -> Any:
+    """Flight code with `changes` of its parameters, None where there are none; ValueError for one that is refused."""
     if not changes:
-        return code
-    after = changed(code.params, changes, f"{kind.word} {_name_of(spec)}")
-    maker: Any = type(code)
-    asked = _arguments(maker)
+        return None
+    home = home_of(maker)
+    with _refusing(kind, spec, home):
+        try:
+            after, problem = changed(params, changes, f"{kind.word} {maker_name(spec)}"), ""
+        except ValueError as error:
+            if place_of(error, home):  # raised in their own code
+                raise
+            after, problem = None, described(error).partition(": ")[2]
+    if problem:
+        raise ValueError(problem)
+    asked = _arguments(kind, spec, maker)
+    with _refusing(kind, spec, home):
+        first = next(iter(inspect.signature(maker).parameters), "")
+        try:
+            made = maker(after, **{name: value for name, value in offered.items() if name in asked - {first}})
+        except TypeError as error:
+            if place_of(error, home):
+                raise
+            raise Refused(f"its class must take its params as an argument: {printable(str(error))}") from error
+    _check_update(kind, spec, made)
+    return made
+
+
+def maker_name(spec: "str | Maker") -> str:
+    """What an estimator is called that is given by name, or by what makes it: ``package.module:Class``.
+
+    What `functools.partial` sets is told behind it.
+    """
+    if isinstance(spec, str):
+        return spec
+    if isinstance(spec, partial):
+        told = [*map(shown, spec.args), *(f"{name}={shown(value)}" for name, value in spec.keywords.items())]
+        return f"{maker_name(spec.func)}({', '.join(told)})"
     try:
-        return maker(after, **{name: value for name, value in also.items() if name in asked})
-    except TypeError as error:
-        raise ValueError(f"{kind.word} {spec!r}: its class must take its params as an argument: {error}") from error
-
-
-def _name_of(spec: "str | Maker") -> str:
-    return spec if isinstance(spec, str) else getattr(spec, "__qualname__", type(spec).__name__)
+        name = getattr(spec, "__qualname__", None) or class_name(spec)
+        return printable(f"{spec.__module__}:{name}")
+    except BaseException:  # anyone's class
+        return class_name(spec)
 
 
 def _check_reference(spec: "str | Maker", estimator: object) -> None:
-    reference = heading_reference_of(estimator)
-    if reference not in ("course", "nose"):
-        raise PluginError(f"estimator {spec!r}: heading_reference is {reference!r}, must be 'course' or 'nose'")
+    from sim.acceptance import reference_of  # here, for it loads the compiler
+
+    with _refusing(_ESTIMATOR, spec, home_of(estimator)):
+        reference_of(estimator)
 
 
 def learnt(estimator: object, known: Mapping[str, Known]) -> dict[str, Known]:
-    """`known` with the properties that `estimator` has learnt in flight, as its ``learnt`` tells, in their place."""
-    found: Mapping[str, Any] = getattr(estimator, "learnt", None) or {}
-    return {**known, **{name: Known(value, "learnt") for name, value in found.items()}}
+    """`known` with the properties that `estimator` has learnt in flight, as its ``learnt`` tells, in their place.
+
+    Raises
+    ------
+    PluginError      one line: it raises, or is no mapping from properties of the instruments to their values
+    """
+    with _refusing(_ESTIMATOR, class_name(estimator), home_of(estimator)):
+        found = getattr(estimator, "learnt", None)
+        if found is None:
+            return dict(known)
+        if not isinstance(found, Mapping):
+            raise Refused(f"learnt is {shown(found)}, must be a mapping from properties of the instruments to values")
+        told = {}
+        for name, value in found.items():  # not more than there are properties: others are refused
+            if not isinstance(name, str) or not isinstance(value, numbers.Real):
+                raise Refused(f"learnt holds {shown(name)}: {shown(value)}, must hold names and numbers")
+            try:
+                told[str(name)] = Known(property_value(name, value), "learnt")
+            except ValueError as error:
+                raise Refused(f"learnt: {error}") from error
+        return {**known, **told}
+
+
+def uses_of(estimator: object, instead: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the instruments that `estimator` can make something of; `instead` where it does not say.
+
+    Raises
+    ------
+    PluginError      one line: it raises, or does not hold names
+    """
+    with _refusing(_ESTIMATOR, class_name(estimator), home_of(estimator)):
+        uses = getattr(estimator, "uses", instead)
+        if not isinstance(uses, tuple | list | set | frozenset) or not all(isinstance(name, str) for name in uses):
+            raise Refused(f"uses is {shown(uses)}, must be names of instruments, such as ('gyro', 'gps')")
+        return tuple(uses)
 
 
 def heading_reference_of(estimator: object) -> "HeadingReference":
-    """What the heading of `estimator` converges to; the course where it does not say."""
-    reference: HeadingReference = getattr(estimator, "heading_reference", "course")
-    return reference
+    """What the heading of `estimator` converges to; the course where it does not say, PluginError for another word."""
+    from sim.acceptance import reference_of  # here, for it loads the compiler
+
+    with _refusing(_ESTIMATOR, class_name(estimator), home_of(estimator)):
+        return reference_of(estimator)
 
 
 def load_autopilot(
@@ -252,7 +344,9 @@ def load_autopilot(
     heading_reference : of the estimator that it will steer on      aircraft : name of what it will fly; both are
     handed to a class that asks for them by these names
     """
-    return _load(_AUTOPILOT, spec, heading_reference=heading_reference, aircraft=aircraft)
+    offered = {"heading_reference": heading_reference, "aircraft": aircraft}
+    autopilot: Autopilot = _made(_AUTOPILOT, spec, _find(_AUTOPILOT, spec), offered)
+    return autopilot
 
 
 def _installed(kind: _Kind) -> dict[str, EntryPoint]:
@@ -263,106 +357,82 @@ def _offered(kind: _Kind) -> dict[str, str]:
     return {**kind.registry, **{name: point.value for name, point in _installed(kind).items()}}
 
 
-def _load(kind: _Kind, spec: "str | Maker", **offered: Any) -> Any:
-    """The object that `spec` names, constructed with those of the `offered` arguments that it asks for, and checked."""
-    what = f"{kind.word} {_name_of(spec)!r}"
-    try:
-        made = _made(_find(kind, spec) if isinstance(spec, str) else spec, offered)
-    except PluginError:
-        raise
-    except Exception as error:  # anything may go wrong in a person's own file: it is their file that is at fault
-        raise PluginError(f"{what}: {_one_line(error)}") from error
-    _check_update(what, kind, made)
+def _made(kind: _Kind, spec: "str | Maker", maker: Any, offered: Mapping[str, Any]) -> Any:
+    """What `maker` makes of those of the `offered` arguments that it asks for, checked."""
+    if not callable(maker):
+        raise PluginError(
+            f"{kind.word} {maker_name(spec)!r}: {shown(maker)} is no class; name the class, or a function that makes a "
+            "new one for each flight"
+        )
+    asked = _arguments(kind, spec, maker)
+    with _refusing(kind, spec, home_of(maker)):
+        made = maker(**{name: value for name, value in offered.items() if name in asked})
+    _check_update(kind, spec, made)
     return made
 
 
-def _made(maker: Any, offered: dict[str, Any]) -> Any:
-    asked = _arguments(maker)
-    return maker(**{name: value for name, value in offered.items() if name in asked})
-
-
-def _arguments(maker: Any) -> set[str]:
+def _arguments(kind: _Kind, spec: "str | Maker", maker: Any) -> set[str]:
     """Names of the arguments with which `maker` can be called."""
-    try:
-        return set(inspect.signature(maker).parameters)
-    except (TypeError, ValueError):
-        return set()  # compiled code that does not tell
+    with _refusing(kind, spec, home_of(maker)):
+        try:
+            parameters = inspect.signature(maker).parameters.values()
+        except (TypeError, ValueError):
+            return set()  # compiled code that does not tell
+        return {p.name for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)}
 
 
 def _find(kind: _Kind, spec: str) -> Any:
     """The class (or whatever is called to make one) that `spec` names."""
+    named = spec
     if spec in kind.registry:
         spec = kind.registry[spec]
     elif ":" not in spec:
         installed = _installed(kind)
         if spec in installed:
-            return installed[spec].load()
+            point = installed[spec]
+            with _refusing(kind, spec, point.value.partition(":")[0].partition(".")[0]):
+                return point.load()
         hint = near_misses(spec, _offered(kind))
         raise PluginError(f"unknown {kind.word} {spec!r}: {hint} (one's own: module:Class or file.py:Class)")
     place, _, name = spec.rpartition(":")
-    module = _module_of_file(Path(place)) if place.endswith(".py") else _module_by_name(kind, place)
-    try:
-        return getattr(module, name)
-    except AttributeError:
-        classes = [n for n, c in vars(module).items() if inspect.isclass(c) and c.__module__ == module.__name__]
+    if place.endswith(".py"):
+        module = module_of_file(Path(place), lambda line: PluginError(f"{kind.word} {named!r}: {line}"))
+    else:
+        module = _module_by_name(kind, named, place)
+    with _refusing(kind, named):
+        try:
+            return getattr(module, name)
+        except AttributeError:
+            classes = [n for n, c in vars(module).items() if inspect.isclass(c) and c.__module__ == module.__name__]
         hint = near_misses(name, classes) if classes else "it defines no class"
-        raise PluginError(f"{kind.word} {spec!r}: no class {name!r} in {place}; {hint}") from None
+        raise Refused(f"no class {name!r} in {place}; {hint}")
 
 
-def _module_of_file(path: Path) -> ModuleType:
-    """The module in the file at `path`; its folder can be imported from, after everything installed."""
-    if not path.is_file():
-        raise PluginError(f"no file {str(path)!r}")
-    path = path.resolve()
-    _also_import_from(path.parent)
-    name = f"_wingslevel_file_{path.stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise PluginError(f"{str(path)!r} cannot be read as Python")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses and pickle look their module up by name
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
-
-
-def _module_by_name(kind: _Kind, name: str) -> ModuleType:
+def _module_by_name(kind: _Kind, spec: str, name: str) -> ModuleType:
     """The importable module `name`, also from the working directory."""
-    _also_import_from(Path.cwd())
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        if error.name is None or not (name == error.name or name.startswith(f"{error.name}.")):
-            raise  # the module is there; something that it imports is not
-        raise PluginError(
-            f"{kind.word} {name!r}: no such module here or installed (a file is named file.py:Class)"
-        ) from None
+    also_import_from(Path.cwd())
+    package = name.partition(".")[0]
+    with _refusing(kind, spec, "" if package in ("estimator", "autopilot", "sim", "scenarios") else package):
+        try:
+            return importlib.import_module(name)
+        except ModuleNotFoundError as error:
+            if error.name is None or not (name == error.name or name.startswith(f"{error.name}.")):
+                raise  # the module is there; something that it imports is not
+        raise Refused(f"no module {name!r} here or installed (a file is named file.py:Class)")
 
 
-def _also_import_from(folder: Path) -> None:
-    if str(folder) not in sys.path:
-        sys.path.append(str(folder))  # last, so that nothing of ours can be shadowed
-
-
-def _check_update(what: str, kind: _Kind, made: Any) -> None:
+def _check_update(kind: _Kind, spec: "str | Maker", made: Any) -> None:
     """Refuse what has no ``update`` of the right number of arguments."""
     wanted = f"update({', '.join(kind.arguments)})"
-    update = getattr(made, "update", None)
-    if not callable(update):
-        raise PluginError(f"{what}: {type(made).__name__} has no method {wanted}")
-    try:
-        signature = inspect.signature(update)
-    except (TypeError, ValueError):
-        return  # compiled code that does not tell
-    try:
-        signature.bind(*kind.arguments)
-    except TypeError:
-        raise PluginError(f"{what}: {type(made).__name__}.update takes {signature}, must be {wanted}") from None
-
-
-def _one_line(error: BaseException) -> str:
-    """`error` as one line: its kind, its text, and for a syntax error where it is."""
-    return f"{type(error).__name__}: {' '.join(str(error).split()) or 'no message'}"
+    with _refusing(kind, spec, home_of(made)):
+        update = getattr(made, "update", None)
+        if not callable(update):
+            raise Refused(f"{class_name(made)} has no method {wanted}")
+        try:
+            signature = inspect.signature(update)
+        except (TypeError, ValueError):
+            return  # compiled code that does not tell
+        try:
+            signature.bind(*kind.arguments)
+        except TypeError:
+            raise Refused(f"{class_name(made)}.update takes {signature}, must be {wanted}") from None

@@ -6,18 +6,19 @@ dictionary from the ending of each name to the line that tells of it (so that a 
 """
 
 import importlib
-import importlib.util
 import pkgutil
-import sys
 from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType, ModuleType
+from typing import cast
 
 import scenarios
+from scenarios.harness.own_files import module_of_file
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.scenario import Scenario
+from sim.blame import Refused, shown, theirs
 
 
 @cache
@@ -63,33 +64,21 @@ def find(name: str) -> Scenario:
 
 
 def _from_file(path: Path) -> Scenario:
-    if not path.is_file():
-        raise ValueError(f"scenario: no file {str(path)!r}")
-    module_name = f"_wingslevel_scenario_{path.stem}"
-    spec = importlib.util.spec_from_file_location(module_name, path)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"scenario: {str(path)!r} cannot be read as Python")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[module_name] = module
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # anything may go wrong in a person's own file: it is their file that is at fault
-        del sys.modules[module_name]
-        text = " ".join(str(error).split())
-        raise ValueError(f"scenario {str(path)!r}: {type(error).__name__}: {text}") from error
-    return _of(module, str(path))
+    module = module_of_file(path, lambda line: ValueError(f"scenario {str(path)!r}: {line}"))
+    with theirs(lambda line: ValueError(f"scenario {str(path)!r}: {line}"), str(path)):
+        return _of(module)
 
 
-def _of(module: ModuleType, where: str) -> Scenario:
+def _of(module: ModuleType) -> Scenario:
     scenario = getattr(module, "SCENARIO", None)
-    if not isinstance(scenario, Scenario):
-        raise ValueError(f"scenario {where!r}: must export SCENARIO, a Scenario")
-    return scenario
+    if not issubclass(type(scenario), Scenario):
+        raise Refused(f"must export SCENARIO, a Scenario; it is {shown(scenario)}")
+    return cast(Scenario, scenario)
 
 
 def _family(module: ModuleType, where: str) -> tuple[Scenario, ...]:
     """The scenario of a module of the package and its variants; ValueError where their names are not as told."""
-    first = _of(module, where)
+    first = _of(module)
     family: tuple[Scenario, ...] = getattr(module, "SCENARIOS", (first,))
     names = [where, *(f"{where}_{ending}" for ending in getattr(module, "VARIANTS", {}))]
     if family[0] is not first or [scenario.name for scenario in family] != names:

@@ -330,7 +330,7 @@ def _parameters() -> frozenset[str]:
     found: set[str] = set()
     for name in plugins.estimators():
         try:
-            params = getattr(plugins.load_estimator(name), "params", None)
+            params = plugins.params_of(name, plugins.load_estimator(name))
         except ValueError:  # one that lacks its package
             continue
         if is_dataclass(params):

@@ -1,0 +1,98 @@
+"""Modules in files of the user's own: estimators, autopilots and scenarios named as ``path/to/file.py``.
+
+A file is run anew each time, so that flights share nothing.  Its module has the name under which it would be imported
+where that name is free; else, as for a second file of that name, one made of its path.  Compiled kernels are cached
+with the name of their module in them: those of a file under such a name are cached apart, so that what one process
+caches another can load, whatever it calls the file.
+"""
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+
+from sim.blame import Refused, theirs
+
+_run: dict[str, ModuleType] = {}  # modules that were made here, by name
+
+
+def module_of_file(path: Path, refuse: Callable[[str], Exception]) -> ModuleType:
+    """The module in the file at `path`; its folder can be imported from, after everything installed.
+
+    Raises
+    ------
+    what `refuse` makes of one line: no such file, or whatever its code raised
+    """
+    if not path.is_file():
+        raise refuse(f"no file {str(path)!r}")
+    path = path.resolve()
+    also_import_from(path.parent)
+    with theirs(refuse, str(path)):
+        imported = sys.modules.get(path.stem)
+        if imported is not None and imported is not _run.get(path.stem) and _is_in(imported, path):
+            return imported  # by somebody's own import statement
+        return _executed(path)
+
+
+def also_import_from(folder: Path) -> None:
+    """Let modules in `folder` be imported, after all others: nothing of ours can be shadowed."""
+    if str(folder) not in sys.path:
+        sys.path.append(str(folder))
+
+
+def _executed(path: Path) -> ModuleType:
+    name = path.stem if _is_free(path) else _name_apart(path)
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise Refused(f"{path.name!r} cannot be read as Python")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = _run[name] = module  # dataclasses and pickle look their module up by name
+    try:
+        with _cached_apart(name, apart=name != path.stem):
+            spec.loader.exec_module(module)
+    except BaseException:
+        sys.modules.pop(name, None)
+        raise
+    return module
+
+
+def _is_free(path: Path) -> bool:
+    """Whether an import of the file's own name gives the file at `path`, or what was made of it here."""
+    name = path.stem
+    if not name.isidentifier() or (path.parent / "__init__.py").exists():
+        return False
+    if name in sys.modules:
+        return _is_in(sys.modules[name], path)
+    importlib.invalidate_caches()  # the file may be newer than what the finders have seen
+    spec = importlib.util.find_spec(name)
+    return spec is not None and spec.origin is not None and Path(spec.origin).resolve() == path
+
+
+def _is_in(module: ModuleType, path: Path) -> bool:
+    file = getattr(module, "__file__", None)
+    return isinstance(file, str) and Path(file).resolve() == path
+
+
+def _name_apart(path: Path) -> str:
+    return f"_wingslevel_file_{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
+
+
+@contextmanager
+def _cached_apart(name: str, *, apart: bool) -> Iterator[None]:
+    """Let numba cache what is compiled inside in a folder of that name."""
+    if not apart:
+        yield
+        return
+    from numba import config
+
+    from estimator.jit import cache_of
+
+    before, config.CACHE_DIR = config.CACHE_DIR, str(cache_of(name))
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = before
