@@ -7,6 +7,7 @@ The calibration is no property but a measurement: where the configuration says `
 parameters have a ``calibration`` is given what the readings of its own magnetometer on the turn-table give.
 """
 
+import inspect
 import math
 from dataclasses import asdict
 from typing import Any, NamedTuple
@@ -21,7 +22,7 @@ from scenarios.harness.plugins import (
     equipped,
     equipped_autopilot,
     heading_reference_of,
-    load_estimator,
+    params_of,
 )
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
 from sim.power_up import field_on_turn_table
@@ -60,11 +61,31 @@ def flight_code(config: FlightConfig, maker: Maker | None = None) -> FlightCode:
     return FlightCode(estimator, equipped_autopilot(config.autopilot, reference, config.aircraft, aboard))
 
 
-def with_calibration(config: FlightConfig) -> FlightConfig:
-    """The resolved `config` with the calibration of its magnetometer in ``estimator_params``, where there is one."""
-    params, given = getattr(load_estimator(config.estimator), "params", None), config.estimator_params
+def unheard(config: FlightConfig, code: FlightCode) -> list[str]:
+    """Properties of the instruments that are set under the resolved `config` and that `code` is not given."""
+    return [name for name in config.instruments if name not in code.estimator.known | code.autopilot.known]
+
+
+def require_heard(config: FlightConfig, code: FlightCode) -> None:
+    """Refuse, with a ValueError of one line, a property of the instruments that is set and that `code` is not given."""
+    for name in unheard(config, code):
+        raise ValueError(
+            f"{name} = {config.instruments[name]!r}: neither estimator {config.estimator} nor autopilot "
+            f"{config.autopilot} has a parameter of that name"
+        )
+
+
+def with_calibration(config: FlightConfig, maker: Maker | None = None) -> FlightConfig:
+    """The resolved `config` with the calibration of its magnetometer in ``estimator_params``, where there is one.
+
+    maker : makes the estimator where it is given; of a function nothing is changed, for it sets its own parameters
+    """
+    given = config.estimator_params
     by_hand = any(name.partition(".")[0] == "calibration" for name in given)
-    if not config.turn_table or by_hand or not hasattr(params, "calibration"):
+    if not config.turn_table or by_hand or not (maker is None or inspect.isclass(maker)):
+        return config
+    params = params_of(maker or config.estimator, equipped(maker or config.estimator).code)
+    if not hasattr(params, "calibration"):
         return config
     declination_rad = instruments_of(config).value("declination_rad", 0.0)
     found = {f"calibration.{name}": value for name, value in asdict(_calibration(config, declination_rad)).items()}

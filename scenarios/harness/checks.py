@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from scenarios.harness.metrics import Metric, survived
+from scenarios.harness.metrics import Measured, Metric, survived
+from sim.blame import Refused, home_of, shown, theirs
 from sim.log import Flight
 
 Pooling = Literal["rms", "worst", "count"]
@@ -17,7 +18,10 @@ LOOSEST = 1.5  # a flight's own limit may be this much looser than the pooled on
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a verdict.  `note` says what is missing where the value rests on too few samples."""
+    """One line of a verdict.
+
+    note : what is missing where the value rests on too few samples, or what the metric raised (`raised`)
+    """
 
     name: str
     unit: str
@@ -26,6 +30,18 @@ class Row:
     limit: float
     passed: bool
     note: str = ""
+    raised: bool = False
+
+
+class _NotMeasured(RuntimeError):
+    """A metric, anyone's function, that raised, or returned something else."""
+
+
+def _measured(value: Measured) -> Measured:
+    """What a metric returned in plain numbers; Refused where it is something else."""
+    if not isinstance(value, Measured):
+        raise Refused(f"its metric returned {shown(value)}, must return a Measured")
+    return Measured(float(value.value), int(value.samples), int(value.expected))
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,15 +78,20 @@ class Check:
     def judge(self, flight: Flight) -> Row:
         """The line of one flight."""
         limit = self.limit if self.per_flight_limit is None else self.per_flight_limit
-        measured = self.metric(flight)
+        try:
+            with theirs(_NotMeasured, home_of(self.metric)):
+                measured = _measured(self.metric(flight))
+        except _NotMeasured as fault:
+            return Row(self.name, self.unit, math.nan, self.sense, limit, False, str(fault), raised=True)
         note = "" if measured.complete else f"{measured.samples} of {measured.expected} samples"
         passed = measured.complete and self._holds(measured.value, limit)
-        return Row(self.name, self.unit, float(measured.value), self.sense, limit, passed, note)
+        return Row(self.name, self.unit, measured.value, self.sense, limit, passed, note)
 
     def pool(self, rows: Sequence[Row]) -> Row:
         """The line of all flights, from the lines of each; a single flight is judged by its own limit."""
         short = sum(bool(row.note) for row in rows)
         note = f"{short} of {len(rows)} flights too short" if short else ""
+        note = next((row.note for row in rows if row.raised), note)
         if self.pooled == "count":
             passing = sum(row.passed for row in rows)
             whole = passing == len(rows) > 0

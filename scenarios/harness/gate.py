@@ -53,7 +53,8 @@ class Task:
     def fly(self) -> FlightVerdict:
         """Fly it and judge it."""
         scenario = find(self.scenario)
-        return judge(scenario, fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator))
+        flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator, kept=True)
+        return judge(scenario, flight)
 
 
 def tasks(names: Sequence[str], seeds: Sequence[int], estimator: str | None, changes: Mapping[str, Any]) -> list[Task]:

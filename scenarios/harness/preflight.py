@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from scenarios.harness.aboard import flight_code
+from scenarios.harness.aboard import flight_code, require_heard, unheard
 from scenarios.harness.catalogue import aircraft
 from scenarios.harness.config import FlightConfig, override, resolve
 from scenarios.harness.plugins import near_misses
@@ -24,16 +24,13 @@ def prepared(name: str, changes: Mapping[str, Any], *, lenient: bool = False) ->
     config = resolve(override(scenario.config, changes))
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
-    unheard = unheard_settings(config)
-    if unheard and not lenient:
-        raise ValueError(
-            f"{unheard[0]} = {config.instruments[unheard[0]]!r}: neither estimator {config.estimator} nor autopilot "
-            f"{config.autopilot} has a parameter of that name"
-        )
+    code = flight_code(config)
+    if not lenient:
+        require_heard(config, code)
+    scenario.scripted(config)
     return scenario, config
 
 
 def unheard_settings(config: FlightConfig) -> list[str]:
     """Properties of the instruments that are set under the resolved `config` and that no flight code is given."""
-    code = flight_code(config)
-    return [name for name in config.instruments if name not in code.estimator.known | code.autopilot.known]
+    return unheard(config, flight_code(config))

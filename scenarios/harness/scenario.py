@@ -2,14 +2,20 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, get_args
 
+from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Script
-from scenarios.harness.checks import Check
+from scenarios.harness.checks import Check, Pooling, Sense
 from scenarios.harness.config import FlightConfig, override
+from sim.blame import Refused, home_of, shown, theirs
 from sim.log import Event, Flight
 
 Moments = Callable[[Flight], Iterable[float]]  # times since the release
+
+
+class ScriptFailed(ValueError):
+    """A scenario's script that raised, or that returned none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +41,18 @@ class Scenario:
     shows_failure: bool = False
 
     def __post_init__(self) -> None:
-        if not self.name.isidentifier():
+        if not isinstance(self.name, str) or not self.name.isidentifier():
             raise ValueError(f"scenario name {self.name!r}: must be letters, digits and underscores")
+        for name, right, fits in (
+            ("story", "a text", isinstance(self.story, str)),
+            ("config", "a FlightConfig", isinstance(self.config, FlightConfig)),
+            ("script", "a function from the configuration to a Script", callable(self.script)),
+            ("checks", "Checks", isinstance(self.checks, tuple | list) and all(map(_is_check, self.checks))),
+            ("milestones", "functions by names", _are_milestones(self.milestones)),
+            ("shows_failure", "True or False", isinstance(self.shows_failure, bool)),
+        ):
+            if not fits:
+                raise ValueError(f"scenario {self.name}: {name} is {shown(getattr(self, name))}, must be {right}")
         names = [check.name for check in self.checks]
         twice = {name for name in names if names.count(name) > 1}
         if not names or twice:
@@ -56,12 +72,57 @@ class Scenario:
         story = "\n".join((told, *self.story.strip().splitlines()[1:]))
         return replace(self, name=f"{self.name}_{ending}", story=story, config=override(self.config, changes), **others)
 
-    def events(self, flight: Flight) -> tuple[Event, ...]:
-        """The milestones that `flight` reached."""
+    def scripted(self, config: FlightConfig) -> Script:
+        """The set-points under the resolved `config`.
+
+        Raises
+        ------
+        ScriptFailed    one line: the scenario's script raises, or returns none
+        """
+        with theirs(lambda line: ScriptFailed(f"scenario {self.name}: script: {line}"), home_of(self.script)):
+            script = self.script(config)
+            if type(script) is not Script:
+                raise Refused(f"it returned {shown(script)}, must return a Script")
+            for t_s, setpoint in script:
+                if type(setpoint) is not Setpoint:
+                    raise Refused(f"at {t_s:g} s it asks for {shown(setpoint)}, must be a Setpoint")
+                if setpoint.mode not in tuple(Mode):
+                    raise Refused(f"at {t_s:g} s it asks for mode {shown(setpoint.mode)}, must be a Mode")
+            return script
+
+    def events(self, flight: Flight) -> tuple[tuple[Event, ...], str]:
+        """The milestones that `flight` reached, and a line on the first that could not be found, or nothing."""
         last_s = float(flight.log.truth["t_s"][-1]) if len(flight.log) else 0.0
-        return tuple(
-            Event(flight.release_s + t_s, text)
-            for text, moments in self.milestones.items()
-            for t_s in moments(flight)
-            if flight.release_s + t_s <= last_s  # NaN, a moment that never came, is not
-        )
+        events, fault = [], ""
+        for text, moments in self.milestones.items():
+            try:
+                with theirs(lambda line, text=text: _Unfound(f"milestone {text!r}: {line}"), home_of(moments)):  # type: ignore[misc]
+                    times_s = [flight.release_s + float(t_s) for t_s in moments(flight)]
+            except _Unfound as problem:
+                fault = fault or str(problem)
+                continue
+            events += [Event(t_s, text) for t_s in times_s if t_s <= last_s]  # NaN, a moment that never came, is not
+        return tuple(events), fault
+
+
+class _Unfound(RuntimeError):
+    """A milestone whose function raised."""
+
+
+def _is_check(check: object) -> bool:
+    """Whether `check` is a Check of which every field is what it must be."""
+    if not isinstance(check, Check):
+        return False
+    words = (check.sense, get_args(Sense)), (check.pooled, get_args(Pooling))
+    return (
+        isinstance(check.name, str)
+        and isinstance(check.unit, str)
+        and callable(check.metric)
+        and all(isinstance(word, str) and word in right for word, right in words)
+    )
+
+
+def _are_milestones(milestones: object) -> bool:
+    if not isinstance(milestones, Mapping):
+        return False
+    return all(isinstance(text, str) and callable(moments) for text, moments in milestones.items())

@@ -58,10 +58,13 @@ def judge(scenario: Scenario, flight: Flight) -> FlightVerdict:
     """Verdict on one flight of `scenario`."""
     config = flight.manifest["config"]
     known = {name: Known.from_json(entry) for name, entry in flight.manifest.get("known_to_estimator", {}).items()}
+    rows = tuple(check.judge(flight) for check in scenario.checks)
+    message = flight.message or next((f"check {row.name!r}: {row.note}" for row in rows if row.raised), "")
+    if fault := flight.manifest.get("scenario_fault"):
+        rows += (Row("milestones", "", math.nan, ">=", 1.0, False, fault, raised=True),)
     return FlightVerdict(
-        scenario.name, config["estimator"], config["seed"], flight.outcome,
-        tuple(check.judge(flight) for check in scenario.checks), summary(flight), flight.message, config["flight"],
-        known,
+        scenario.name, config["estimator"], config["seed"], flight.outcome, rows, summary(flight), message,
+        config["flight"], known,
     )  # fmt: skip
 
 
