@@ -23,7 +23,8 @@ from scenarios.harness import console
 from scenarios.harness.checks import Row
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
-from sim.acceptance import command_of, estimate_of
+from scenarios.harness.verdict import FAILED, SIMULATION_FAILED
+from sim.acceptance import FlightCodeFailed, blaming, command_of, estimate_of
 from sim.clock import Rates
 from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Flight, Log, Outcome
@@ -101,6 +102,14 @@ def _limited(name: str, unit: str, value: float, limit: float) -> Row:
     return Row(name, unit, value, "<=", limit, value <= limit)
 
 
+class NotTimed(RuntimeError):
+    """A flight that did not last, or flight code that failed while it was timed; `exit_code` as for a flight."""
+
+    def __init__(self, why: str, exit_code: int = FAILED) -> None:
+        super().__init__(why)
+        self.exit_code = exit_code
+
+
 class Cruise:
     """A flight straight ahead in still air, that can be flown again and again."""
 
@@ -142,7 +151,9 @@ class Cruise:
         if flight.outcome == Outcome.INTERRUPTED:
             raise KeyboardInterrupt
         if flight.outcome != Outcome.COMPLETED:
-            raise ValueError(f"the benchmark's flight did not last: {flight.message or flight.outcome}")
+            code = SIMULATION_FAILED if flight.outcome == Outcome.DIVERGED else FAILED
+            why = flight.message or flight.outcome.replace("_", " ")
+            raise NotTimed(f"the benchmark's flight did not last: {why}", code)
 
     def bare_us(self) -> float:
         """The physics alone, microseconds a tick, from the same start; its first second is left out too."""
@@ -179,20 +190,24 @@ class Cruise:
     def update_ns(self) -> float:
         """`update` over the measurements of the last flight, nanoseconds a call."""
         estimator, _ = self.pilots()
-        inputs = [Measurements(self.log.measured, k) for k in range(len(self.log))]
+        rows = self.log.measured.copy()
+        inputs = [Measurements(rows, k) for k in range(len(rows))]
 
         def run() -> None:
             update = estimator.update
             for m in inputs:
                 update(m)
 
-        return _least_ns(run) / len(inputs)
+        with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
+            return _least_ns(run) / len(inputs)
 
     def kernel_ns(self) -> float | None:
         """The kernel over the same measurements in one call, nanoseconds a tick; None where there is none."""
         estimator, _ = self.pilots()
-        replay = getattr(estimator, "replay", None)
-        return None if replay is None else _least_ns(lambda: replay(self.log.measured)) / len(self.log)
+        rows = self.log.measured.copy()
+        with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
+            replay = getattr(estimator, "replay", None)
+            return None if replay is None else _least_ns(lambda: replay(rows)) / len(rows)
 
 
 def _least_ns(run: Callable[[], Any], repeats: int = 7) -> float:
@@ -211,8 +226,15 @@ def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int
 
     Raises
     ------
-    ValueError      no such estimator, or one on which the aeroplane does not stay in the air
+    ValueError      no such estimator      NotTimed    one that fails, or does not keep the aeroplane in the air
     """
+    try:
+        return _measured(estimator, seconds, repeats, advance)
+    except FlightCodeFailed as failure:
+        raise NotTimed(str(failure)) from failure
+
+
+def _measured(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
     cruise = Cruise(estimator, seconds)
     cruise.closed_us()  # compiles, and warms up
     cruise.bare_us()

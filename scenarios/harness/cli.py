@@ -48,6 +48,7 @@ from scenarios.harness.cli_options import (
 )
 from scenarios.harness.cli_reports import check_file, refusal, reporting, usage, write
 from scenarios.harness.console import INTERRUPTED, USAGE
+from sim.blame import show_tracebacks
 
 FLIGHTS = Path("flights")  # where recordings go unless told otherwise
 
@@ -84,7 +85,11 @@ def run(arguments: list[str]) -> int:
 def _root(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and stop.")] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help="Show the whole traceback where code of your own raises.")
+    ] = False,
 ) -> None:
+    show_tracebacks(traceback)
     if version:
         typer.echo(f"wingslevel {version_of('wingslevel')}")
         raise typer.Exit
@@ -232,7 +237,7 @@ def compare(
             carried = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
             changes |= given({"withheld": withhold})
-            plan = comparing.prepare(scenario, names_of(estimators), gate.parse_seeds(seeds), changes)
+            plan = comparing.prepare(scenario, names_of(estimators, "--estimators"), gate.parse_seeds(seeds), changes)
             console.warn_if_cold()
             with console.progress("flying", "flights") as advance:
                 compared = comparing.fly(plan, workers or gate.processors(), advance)
@@ -311,13 +316,13 @@ def replay(
         with usage():
             told = replaying.run(
                 log,
-                names_of(estimator),
+                names_of(estimator, "--estimator"),
                 out,
                 reference=reference,
                 columns=columns,
                 imu=imu,
                 params=changes_of(set_),
-                withheld=names_of(withhold),
+                withheld=names_of(withhold, "--withhold"),
                 window=Window(airborne, settle, calibration),
                 rerun=not no_rerun,
             )
@@ -340,8 +345,13 @@ def bench(
         from scenarios.harness import bench as benchmark
 
         console.warn_if_cold()
-        with usage(), console.progress("measuring", "pairs") as advance:
-            speed = benchmark.measure(estimator, seconds, repeats, advance)
+        try:
+            with usage(), console.progress("measuring", "pairs") as advance:
+                speed = benchmark.measure(estimator, seconds, repeats, advance)
+        except benchmark.NotTimed as problem:
+            report({"passed": False, "estimator": estimator, "failure": str(problem)})
+            console.error(str(problem))
+            return problem.exit_code
         benchmark.tell(speed)
         report(speed.to_json())
     return 0 if speed.passed else 1

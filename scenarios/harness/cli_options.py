@@ -132,6 +132,9 @@ def air(
     return given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
 
 
-def names_of(text: str | None) -> list[str]:
-    """Names of a list with commas."""
-    return [name.strip() for name in (text or "").split(",") if name.strip()]
+def names_of(text: str | None, option: str) -> list[str]:
+    """Names of a list with commas; none where the option was not given, and refused where it names none."""
+    names = [name.strip() for name in (text or "").split(",") if name.strip()]
+    if text is not None and not names:
+        raise refusal(f"{option} {text!r}: name at least one")
+    return names

@@ -31,12 +31,14 @@ from scenarios.harness.plugins import (
     heading_reference_of,
     load_estimator,
     shared_settings,
+    uses_of,
     without,
 )
 from scenarios.harness.preflight import prepared, unheard_settings
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, judge
+from sim.blame import home_of, theirs
 from sim.log import Outcome
 
 LETTERS = {"gyro": "G", "accelerometer": "A", "gps": "P", "magnetometer": "M", "airspeed": "V"}
@@ -66,16 +68,21 @@ class Task:
     def fly(self) -> Traced:
         """Fly it, judge it, and keep its errors."""
         scenario = find(self.scenario)
-        flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator)
+        options: dict[str, Any] = {"seed": self.seed, "estimator": self.estimator, "lenient": True, "kept": True}
+        flight = fly_scenario(scenario, self.overrides, **options)
         return Traced(judge(scenario, flight), inclination_error_deg(flight), heading_error_deg()(flight))
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """What one update costs, ns: a call of `update`, and of a whole log in one call where there is a `replay`."""
+    """What one update costs, ns: a call of `update`, and of a whole log in one call where there is a `replay`.
+
+    failure : one line on what was raised while it was timed
+    """
 
     update_ns: float
     replay_ns: float | None
+    failure: str = ""
 
     @property
     def ns(self) -> float:
@@ -88,7 +95,7 @@ class Entrant:
     """One estimator of the comparison: what it is given, and how its flights went.
 
     given : the instruments that it uses and that are fitted       n_planned : flights it was to fly
-    pooled : the scenario's checks over all its flights; None where none was flown      cost : None where not measured
+    pooled : the scenario's checks over all its flights; None where none was flown      timing : None where not measured
     """
 
     name: str
@@ -97,7 +104,12 @@ class Entrant:
     n_planned: int
     flights: tuple[Traced, ...]
     pooled: PooledVerdict | None
-    cost: Cost | None = None
+    timing: Cost | None = None
+
+    @property
+    def cost(self) -> Cost | None:
+        """What an update costs; None where it was not measured, or failed."""
+        return None if self.timing is None or self.timing.failure else self.timing
 
     @property
     def known(self) -> dict[str, Known]:
@@ -145,6 +157,7 @@ class Entrant:
             **{name: value if math.isfinite(value) else None for name, value in self.numbers.items()},
             "update_ns": self.cost.update_ns if self.cost else None,
             "replay_ns": self.cost.replay_ns if self.cost else None,
+            **({"failure": self.timing.failure} if self.timing and self.timing.failure else {}),
             "checks": len(self.pooled.rows) if self.pooled else 0,
             "checks_passed": self.checks_passed,
         }
@@ -167,13 +180,20 @@ class Comparison:
 
     @property
     def exit_code(self) -> int:
-        """0 where all flew, 1 where an estimator or autopilot failed, 3 where a simulation blew up, 130 interrupted."""
+        """As of the command line.
+
+        0 where all flew, 1 where flight code or the scenario's own functions failed, 3 where a simulation blew up, 130
+        where it was interrupted
+        """
         outcomes = {f.verdict.outcome for e in self.entrants for f in e.flights}
         if not self.whole:
             return console.INTERRUPTED
         if Outcome.DIVERGED in outcomes:
             return 3
-        return 1 if outcomes & {Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED} else 0
+        not_timed = any(e.timing is not None and e.timing.failure for e in self.entrants)
+        raised = any(row.raised for e in self.entrants for f in e.flights for row in f.verdict.rows)
+        failed = outcomes & {Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.SCENARIO_FAILED}
+        return 1 if failed or not_timed or raised else 0
 
     def to_json(self) -> dict[str, Any]:
         """All of it as plain data: a line per estimator, and the verdict on every flight as `check` writes it."""
@@ -314,30 +334,47 @@ def given(estimator: object, config: FlightConfig) -> tuple[str, ...]:
     """The instruments that are fitted in this flight and that `estimator` can make something of."""
     suite = suite_params(config.suite, config.sensors, config.files)
     fitted = {name for name in LETTERS if getattr(suite, name, None) is not None}
-    return tuple(name for name in getattr(estimator, "uses", _UNKNOWN) if name in fitted)
+    return tuple(name for name in uses_of(estimator, _UNKNOWN) if name in fitted)
 
 
 def _costs(plan: Plan, failed: Container[str]) -> dict[str, Cost]:
     """What an update of each that did not fail costs, over the measurements of the first seconds of a flight."""
     another = {"duration_s": TIMED_S, "estimator": "premerlani", "estimator_params": {}}
     config = plan.config.model_copy(update=another)
-    rows = fly_config(plan.scenario, config).log.measured
-    # The oracle answers in a flight alone.
-    timed = (name for name in plan.names if name not in failed and name != "oracle")
-    return {name: cost(name, rows, instruments_of(config)) for name in timed}
+    costs: dict[str, Cost] = {}
+    try:
+        rows = fly_config(plan.scenario, config, lenient=True).log.measured
+    except ValueError as problem:  # a script that asks for a longer flight
+        console.error(f"not timed: {problem}")
+        return costs
+    for name in plan.names:
+        if name in failed or name == "oracle":  # the oracle answers in a flight alone
+            continue
+        try:
+            costs[name] = cost(name, rows, instruments_of(config))
+        except _NotTimed as problem:  # its flights are kept
+            costs[name] = Cost(math.nan, None, str(problem))
+    return costs
+
+
+class _NotTimed(RuntimeError):
+    """An estimator that raised while it was timed."""
 
 
 def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
     """Least time of several passes over `rows`, per row; a slow one is timed over fewer of them."""
-    estimator, inputs = equipped(name, instruments).code, [Measurements(rows, k) for k in range(len(rows))]
+    rows = rows.copy()  # an estimator may write into them
+    inputs = [Measurements(rows, k) for k in range(len(rows))]
+    estimator = equipped(name, instruments).code
 
     def stream() -> None:
         update = estimator.update
         for m in inputs:
             update(m)
 
-    replay = getattr(estimator, "replay", None)
-    return Cost(_least_ns(stream) / len(rows), None if replay is None else _least_ns(lambda: replay(rows)) / len(rows))
+    with theirs(_NotTimed, home_of(estimator)):
+        replay, update_ns = getattr(estimator, "replay", None), _least_ns(stream) / len(rows)
+        return Cost(update_ns, None if replay is None else _least_ns(lambda: replay(rows)) / len(rows))
 
 
 def _least_ns(run: Callable[[], Any]) -> float:
@@ -385,9 +422,11 @@ def tell(comparison: Comparison) -> None:
         out.print(Text(f"note        {line}"), soft_wrap=True)
     console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
     for entrant in comparison.entrants:
+        if entrant.timing is not None and entrant.timing.failure:
+            out.print(Text(f"{entrant.name}, while it was timed: {entrant.timing.failure}", "red"), soft_wrap=True)
         for flown in entrant.flights:
             v = flown.verdict
-            if v.outcome != Outcome.COMPLETED:
+            if v.outcome != Outcome.COMPLETED or any(row.raised for row in v.rows):
                 why = f"{v.outcome.replace('_', ' ')} at {v.metrics['flown_s'] or 0.0:.1f} s"
                 text = f"{entrant.name}, seed {v.seed}: {why}" + (f": {v.message}" if v.message else "")
                 out.print(Text(text, "red"), soft_wrap=True)

@@ -10,10 +10,11 @@ algorithm agree from the first sample on.
 """
 
 import math
+import operator
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,14 @@ from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.logs.validity import INTERVALS, LONGEST_S
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import Equipped, equipped, heading_reference_of, learnt
-from sim.acceptance import FlightCodeFailed, estimate_of
+from scenarios.harness.plugins import Equipped, PluginError, equipped, heading_reference_of, learnt
+from sim.acceptance import FlightCodeFailed, blaming, estimate_of, record_estimates
+from sim.blame import Refused, shown
 from sim.events import events_of
 from sim.log import Event, Flight, Log, Outcome, Phase
+from sim.loop import power_up
 from sim.oracle import Oracle
+from sim.wording import printable
 
 CALIBRATION_S = 2.0
 STILL_M_S, STILL_M_S2 = 2.0, 0.7  # faster over the ground, or shaken more than this (sigma), is not at rest
@@ -50,6 +54,7 @@ SCORES = (
     "inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg", "heading_rms_deg",
     "rotation_rms_deg", "rotation_max_deg",
 )  # fmt: skip
+MOST_REFUSED = 100  # kinds of samples that an estimator may count
 SHARE_S, REPEATS = 0.3, 7  # the time is the least of several runs, while they take no longer than this
 
 
@@ -116,7 +121,7 @@ def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None =
     ValueError      one line: no such estimator or parameter; the oracle, for which no log holds the truth
     """
     made = equipped(spec, instruments, {name: literal(value) for name, value in params.items()})
-    if isinstance(made.code, Oracle):
+    if issubclass(type(made.code), Oracle):
         raise ValueError("the oracle reads the truth from a simulator: it cannot be replayed over a log")
     return made
 
@@ -140,37 +145,73 @@ def replay(
     ValueError      one line: no such estimator or parameter, or a calibration longer than the log
     """
     window = window or Window()
-    unknown = set(withheld) >= set(PROPERTIES)  # nor is it given what was measured before the log
-    of_log = {name: entry for name, entry in log.known.items() if not (unknown and name.startswith("calibration."))}
-    estimator, known = make(spec, params or {}, Instruments(of_log, withheld=withheld))
+    estimator, known = make(spec, params or {}, known_to(log, withheld))
+    reference = heading_reference_of(estimator)
     n = _calibration(log, window)
     on_ground = at_rest(log.rows[:n]) if n else None
     first = n if on_ground is not None else 0
-    if n and on_ground is None and not unknown:
+    if n and on_ground is None and not _all_of(withheld):
         on_ground = log.on_ground
     flown = Log.empty(len(log.rows))
     _truth_of(log, flown.truth)
     flown.measured[:] = log.rows
-    failure, ns_per_update = "", math.nan
+    failure, ns_per_update, said = "", math.nan, _Said(known, None, {})
     try:
         ns_per_update = _run(estimator, on_ground, log.rows, first, flown.flown, advance)
     except FlightCodeFailed as failed:
         failure = str(failed)
-        flown.flown["R_eb"] = np.where(np.isfinite(flown.flown["R_eb"]), flown.flown["R_eb"], np.eye(3))
+    try:
+        said = _said(estimator, known, float(log.rows["t_s"][-1]))
+    except (FlightCodeFailed, PluginError) as failed:
+        failure = failure or str(failed)
     judged = judged_rows(log, window, first)
     scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
+    ns_per_update = math.nan if failure else ns_per_update
     return Replayed(
-        spec.rpartition(":")[2],
-        heading_reference_of(estimator),
-        flown,
-        first,
-        ns_per_update,
-        getattr(estimator, "rejected", None),
-        scores,
-        failure,
-        learnt(estimator, known),
-        getattr(estimator, "refused", {}),
-    )
+        spec.rpartition(":")[2], reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
+        said.refused,
+    )  # fmt: skip
+
+
+def known_to(log: RecordedLog, withheld: Sequence[str] = ()) -> Instruments:
+    """What an estimator is given of the instruments of `log`; where all is withheld, no calibration either."""
+    unknown = _all_of(withheld)  # nor is it given what was measured before the log
+    of_log = {name: entry for name, entry in log.known.items() if not (unknown and name.startswith("calibration."))}
+    return Instruments(of_log, withheld=withheld)
+
+
+def _all_of(withheld: Sequence[str]) -> bool:
+    return set(withheld) >= set(PROPERTIES)
+
+
+class _Said(NamedTuple):
+    """What an estimator says of itself after a replay."""
+
+    known: Mapping[str, Known]
+    rejected: int | None
+    refused: Mapping[str, int]
+
+
+def _said(estimator: object, known: Mapping[str, Known], t_s: float) -> _Said:
+    """What `estimator` says after its replay; FlightCodeFailed or PluginError where that is rubbish."""
+    told = learnt(estimator, known)
+    with blaming(Outcome.ESTIMATOR_FAILED, estimator, t_s):
+        rejected = getattr(estimator, "rejected", None)
+        refused = getattr(estimator, "refused", {})
+        if not isinstance(refused, Mapping) or len(refused) > MOST_REFUSED:
+            raise Refused(f"refused is {shown(refused)}, must be numbers of samples by instrument")
+        counts = {printable(str(name)): _count(f"refused[{shown(name)}]", n) for name, n in refused.items()}
+        return _Said(told, None if rejected is None else _count("rejected", rejected), counts)
+
+
+def _count(name: str, value: object) -> int:
+    try:
+        number = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        number = -1
+    if not 0 <= number < 2**63:
+        raise Refused(f"{name} is {shown(value)}, must be a number of samples")
+    return int(number)
 
 
 def at_rest(rows: NDArray[Any]) -> ImuSample | None:
@@ -325,37 +366,55 @@ def _run(
     flown: NDArray[Any],
     advance: console.Advance,
 ) -> float:
-    """Fill `flown` from row `first` on; returns nanoseconds an update."""
-    total = len(rows)
-    if not hasattr(estimator, "replay"):
-        _reset(estimator, on_ground)
+    """Fill `flown` from row `first` on; returns nanoseconds an update.
+
+    The estimator is given copies: nothing that it writes into them is judged, or seen by another.  A row that is
+    refused is left as if nothing had been estimated.
+    """
+    total, began_s = len(rows), float(rows["t_s"][first])
+    writeable, rows = rows.flags.writeable, rows.copy()
+    rows.flags.writeable = writeable  # as it was: kernels are compiled for it
+    with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
+        replay = getattr(estimator, "replay", None)
+    power_up(estimator, _copied(on_ground))
+    if replay is None:
         began = time.perf_counter()
         for k in range(first, total):
-            estimate_of(estimator, Measurements(rows, k), flown, k)
+            try:
+                estimate_of(estimator, Measurements(rows, k), flown, k)
+            except FlightCodeFailed:
+                flown[k] = Log.empty(1).flown[0]
+                raise
             if k % BLOCK == 0:
                 advance(k, total)
         return 1e9 * (time.perf_counter() - began) / (total - first)
-    _reset(estimator, on_ground)
-    estimator.replay(rows[first : first + 1])  # compiles, where that has not been done
+    with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
+        replay(rows[first : first + 1])  # compiles, where that has not been done
     spent, least = 0.0, math.inf
     for i in range(REPEATS):
-        _reset(estimator, on_ground)
-        began = time.perf_counter()
-        estimates = estimator.replay(rows[first:])
-        took = time.perf_counter() - began
+        power_up(estimator, _copied(on_ground))
+        with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
+            began = time.perf_counter()
+            estimates = replay(rows[first:])
+            took = time.perf_counter() - began
         spent, least = spent + took, min(least, took)
         advance(i + 1, REPEATS)
         if spent > SHARE_S:
             break
-    for name in estimates.dtype.names:
-        flown[name][first:] = estimates[name]
+    with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
+        good, fault = record_estimates(flown[first:], estimates)
+    if fault:
+        flown[first + good] = Log.empty(1).flown[0]
+        raise FlightCodeFailed(Outcome.ESTIMATOR_FAILED, estimator, float(rows["t_s"][first + good]), fault)
     return 1e9 * least / (total - first)
 
 
-def _reset(estimator: AttitudeEstimator, on_ground: ImuSample | None) -> None:
-    reset = getattr(estimator, "reset", None)
-    if reset is not None:
-        reset(on_ground)
+def _copied(on_ground: ImuSample | None) -> ImuSample | None:
+    if on_ground is None:
+        return None
+    return on_ground._replace(
+        gyro_b_rad_s=np.array(on_ground.gyro_b_rad_s), force_b_m_s2=np.array(on_ground.force_b_m_s2)
+    )
 
 
 def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:

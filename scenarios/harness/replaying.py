@@ -12,7 +12,7 @@ from estimator.instruments import Instruments, property_names, to_json
 from scenarios.harness import console, logs, viewing
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.plugins import shared_settings, without
-from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, make, replay, why_none
+from scenarios.harness.replay import Replayed, Window, as_flight, judged_rows, known_to, make, replay, why_none
 from sim import recording
 
 _HEADINGS = ("", "inclination\n   RMS    p95    max", "heading\nRMS", "rotation\n   RMS    max", "ns per\nupdate")
@@ -89,14 +89,16 @@ def run(
     ValueError      one line: log, reference, map, estimator, parameter or folder; nothing has been written then
     """
     window, params = window or Window(), params or {}
-    if len({name.rpartition(":")[2] for name in names}) < len(names):
-        raise ValueError(f"--estimator {','.join(names)}: name each one once")
+    if not names or len({name.rpartition(":")[2] for name in names}) < len(names):
+        raise ValueError(f"--estimator {','.join(names)}: name at least one, name each one once")
     settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
     of_each, withheld = shared_settings(names, settings), property_names(withheld)
     for name in names:
         make(name, of_each[name])
     recording.check_writable(into)
     log = logs.read(path, reference=reference, columns=columns, imu=imu)
+    for name in names:  # again with what the log tells: all are made before any is run
+        make(name, of_each[name], known_to(log, withheld))
     console.warn_if_cold()
     replays, folders = [], {}
     for name in names:
