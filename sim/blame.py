@@ -53,6 +53,8 @@ def show_tracebacks(on: bool) -> None:
 class theirs:
     """A block in which somebody else's code runs: what it raises becomes ``refuse(line)``.
 
+    The working directory is afterwards what it was: paths are relative to it.
+
     Parameters
     ----------
     refuse      makes what is raised instead, from the line
@@ -64,12 +66,14 @@ class theirs:
 
     def __enter__(self) -> None:
         self._listening.__enter__()
-        self._before = heard()
+        self._before, self._folder = heard(), _working_directory()
 
     # A generator would not do: contextlib lets StopIteration through where a RuntimeError is raised from it.
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if self._folder and _working_directory() != self._folder:
+            os.chdir(self._folder)
         try:
             if heard() != self._before or (kind is TimedOut and heard()[1]) or (kind is Interrupted and heard()[0]):
                 check()  # it may have been swallowed, and something else raised instead
@@ -77,6 +81,14 @@ class theirs:
                 raise self._refuse(told(error, self._home)) from error
         finally:
             self._listening.__exit__(None, None, None)
+
+
+def _working_directory() -> str:
+    """The working directory; empty where it has been removed."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return ""
 
 
 def told(error: BaseException, home: str = "") -> str:

@@ -275,6 +275,7 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     for name, instead in (("estimator", "--estimators"), ("seed", "--seeds")):
         if name in changes:
             raise ValueError(f"--set {name}={changes[name]}: name what is to be flown with {instead}")
+    find(scenario)  # before anything is constructed, which may mean compiling for a while
     names = tuple(dict.fromkeys(estimators)) or tuple(name for name in ESTIMATORS if _can_be_loaded(name))
     settings = {key.removeprefix(PREFIX): value for key, value in changes.items() if key.startswith(PREFIX)}
     shared = {key: value for key, value in changes.items() if not key.startswith(PREFIX)}

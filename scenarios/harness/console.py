@@ -107,13 +107,16 @@ def note(line: str) -> None:
 
 
 @contextmanager
-def compiling_told() -> Iterator[None]:
-    """Say, once inside the block, when kernels begin to be compiled; on a terminal count them while it lasts."""
+def compiling_told() -> Iterator[compiling.Watch]:
+    """Say, once inside the block, when kernels begin to be compiled; on a terminal count them while it lasts.
+
+    Gives what is called for each kernel of this process: it may be handed those of worker processes, too.
+    """
     shown = _Compiling()
     before = compiling.on_compile(shown)
     compiling.on_trouble(lambda line: error(f"kernel cache: {printable(line)}"))
     try:
-        yield
+        yield shown
     finally:
         shown.clear()
         compiling.on_compile(before)

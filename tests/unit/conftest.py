@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.interface import MEASURED_DTYPE
-from scenarios.harness import logs, workers
+from scenarios.harness import console, logs, workers
 from scenarios.harness.logs.recorded import RecordedLog, Reference
 
 PLACE = 47.4, 8.5, 488.0
@@ -220,3 +220,12 @@ class HandHeld:
 def held() -> HandHeld:
     """A motion as columns."""
     return HandHeld()
+
+
+@pytest.fixture(autouse=True)
+def _no_word_of_compiling(monkeypatch):
+    """Commands run in this process do not say that kernels are compiled: what they print is the same on a cold cache.
+
+    `test_compiling` has a fixture of this name that leaves it be.
+    """
+    monkeypatch.setattr(console._Compiling, "__call__", lambda self, progress: None)

@@ -18,6 +18,19 @@ from sim import signals
 LINE = "compiling the kernels, once for this version: about half a minute\n"
 
 
+@pytest.fixture(autouse=True)
+def _no_word_of_compiling():
+    """Here it is said."""
+
+
+@pytest.fixture(autouse=True)
+def _ctrl_c():
+    """SIGINT as at a terminal: under nohup it is ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.fixture
 def kernels(tmp_path, monkeypatch):
     """Makes a kernel that calls another, both new to the cache; or, the second time, known to it."""
