@@ -265,7 +265,9 @@ def _log_of(file: pq.ParquetFile, path: Path) -> Log:
     recording_checks.column("truth.t_s", file.read(columns=["truth.t_s"])["truth.t_s"], rows)
     table, log = file.read(), Log.empty(rows)
     for e in elements():
-        getattr(log, e.table)[e.column.name][(slice(None), *e.at)] = recording_checks.column(e.name, table[e.name], rows)
+        getattr(log, e.table)[e.column.name][(slice(None), *e.at)] = recording_checks.column(
+            e.name, table[e.name], rows
+        )
     return log
 
 

@@ -62,7 +62,9 @@ def _own(data: Mapping[str, Any]) -> None:
     _choice("outcome", data["outcome"], tuple(Outcome))
     _choice("heading_reference", data["heading_reference"], ("course", "nose"))
     _text("message", data["message"])
-    _number("dt_s", data["dt_s"], lambda v: 0.0 < v <= LONGEST_TICK_S, f"the length of a tick, 0 to {LONGEST_TICK_S:g} s")
+    _number(
+        "dt_s", data["dt_s"], lambda v: 0.0 < v <= LONGEST_TICK_S, f"the length of a tick, 0 to {LONGEST_TICK_S:g} s"
+    )
     _number("release_s", data["release_s"], lambda v: abs(v) < LATEST_S, "a time in seconds")
     n = data["n_ticks"]
     if not isinstance(n, int) or isinstance(n, bool) or n < 0:
@@ -140,7 +142,9 @@ def schema(found: pa.Schema, expected: Mapping[str, bool], rows: int) -> None:
     for name, integer in expected.items():
         kind, wanted = found.field(name).type, pa.int64() if integer else pa.float64()
         if kind != wanted:
-            raise ValueError(f"column {name} holds {printable(str(kind), 60)}, not {'whole ' if integer else ''}numbers ({wanted})")
+            raise ValueError(
+                f"column {name} holds {printable(str(kind), 60)}, not {'whole ' if integer else ''}numbers ({wanted})"
+            )
 
 
 def column(name: str, values: pa.ChunkedArray, rows: int) -> NDArray[Any]:
@@ -155,7 +159,9 @@ def column(name: str, values: pa.ChunkedArray, rows: int) -> NDArray[Any]:
         _check_times(name, numbers)
     if (allowed := _CHOICES.get(name)) is not None and (wrong := ~np.isin(numbers, allowed)).any():
         first = int(np.argmax(wrong))
-        raise ValueError(f"column {name}, row {first + 1}: {numbers[first]} must be one of {', '.join(map(str, map(int, allowed)))}")
+        raise ValueError(
+            f"column {name}, row {first + 1}: {numbers[first]} must be one of {', '.join(map(str, map(int, allowed)))}"
+        )
     return numbers
 
 
@@ -167,7 +173,9 @@ def _check_times(name: str, t_s: NDArray[Any]) -> None:
     late = np.diff(t_s) <= 0.0
     if late.any():
         first = int(np.argmax(late)) + 1
-        raise ValueError(f"column {name}, row {first + 1}: {t_s[first]:g} s is not after the row before, {t_s[first - 1]:g} s")
+        raise ValueError(
+            f"column {name}, row {first + 1}: {t_s[first]:g} s is not after the row before, {t_s[first - 1]:g} s"
+        )
 
 
 def _number(where: str, value: Any, right: Callable[[float], bool], wanted: str) -> None:

@@ -176,7 +176,8 @@ def serve(parent: int) -> None:
         raw = requests.read(_FRAME)
         if len(raw) < _FRAME:
             return
-        _answer(*pickle.loads(requests.read(int.from_bytes(raw, "little"))), answers)
+        function, path, options, memory, longest_s = pickle.loads(requests.read(int.from_bytes(raw, "little")))
+        _answer(function, path, options, memory, longest_s, answers)
 
 
 def _answer(

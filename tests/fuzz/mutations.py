@@ -13,23 +13,105 @@ import numpy as np
 
 Generator = np.random.Generator
 CELLS = (
-    "1e308", "-1e308", "1e99", "-1", "0", "nan", "", "inf", "-inf", "-", "1e", "x" * 300, "\u0663\u0664", "\u00b2", "9" * 400, "0x1F",
-    "1_000", '"', "'", "12:34:56", "2026-07-02T12:00:00", "\x1b[31m", "\u202e", "1,5", "#", "//", "true", "1e-320", "\0",
-)  # fmt: skip
+    "1e308",
+    "-1e308",
+    "1e99",
+    "-1",
+    "0",
+    "nan",
+    "",
+    "inf",
+    "-inf",
+    "-",
+    "1e",
+    "x" * 300,
+    "\u0663\u0664",
+    "\u00b2",
+    "9" * 400,
+    "0x1F",
+    "1_000",
+    '"',
+    "'",
+    "12:34:56",
+    "2026-07-02T12:00:00",
+    "\x1b[31m",
+    "\u202e",
+    "1,5",
+    "#",
+    "//",
+    "true",
+    "1e-320",
+    "\0",
+)
 TOML = (
-    "1e308", "-1e308", "nan", "-inf", "-1", "0", "9" * 5000, "9" * 400, "true", '""', "[]", "{}", "[[]]", "2026-07-02", "12:00:00",
-    '"x"', '"' + "y" * 300 + '"', "[" * 3000 + "]" * 3000, '"\\u0000"', "{ value = [] }", "0x7f", '"gyro.x deg/s"', '"-force.z"',
-    "[1, 2, 3]", '{ is = "mag.x", unit = "mG", factor = 0.9, offset = 1e308 }',
-)  # fmt: skip
+    "1e308",
+    "-1e308",
+    "nan",
+    "-inf",
+    "-1",
+    "0",
+    "9" * 5000,
+    "9" * 400,
+    "true",
+    '""',
+    "[]",
+    "{}",
+    "[[]]",
+    "2026-07-02",
+    "12:00:00",
+    '"x"',
+    '"' + "y" * 300 + '"',
+    "[" * 3000 + "]" * 3000,
+    '"\\u0000"',
+    "{ value = [] }",
+    "0x7f",
+    '"gyro.x deg/s"',
+    '"-force.z"',
+    "[1, 2, 3]",
+    '{ is = "mag.x", unit = "mG", factor = 0.9, offset = 1e308 }',
+)
 VALUES: tuple[Any, ...] = (
-    None, True, False, -1, 0, 10**400, 1e308, -1e308, float("nan"), float("inf"), "", "x", "1", "\x1b[31m", "\ud800", [], {}, [[]],
-    [1, 2, 3], {"a": None}, {"value": None, "source": "set"}, "y" * 500,
-)  # fmt: skip
+    None,
+    True,
+    False,
+    -1,
+    0,
+    10**400,
+    1e308,
+    -1e308,
+    float("nan"),
+    float("inf"),
+    "",
+    "x",
+    "1",
+    "\x1b[31m",
+    "\ud800",
+    [],
+    {},
+    [[]],
+    [1, 2, 3],
+    {"a": None},
+    {"value": None, "source": "set"},
+    "y" * 500,
+)
 NUMBERS = (1e308, -1e308, 1e99, 1e12, -1.0, 0.0, np.nan, np.inf, -np.inf, 5e-324, 4.5e15)
 _PATTERNS = (
-    b"\xff" * 4, b"\xff" * 8, b"\0" * 8, b"\x7f" * 8, struct.pack("<d", 1e308), struct.pack("<f", 3e38), struct.pack("<d", np.nan),
-    struct.pack("<i", -1), struct.pack("<Q", 1 << 63), struct.pack("<I", 0x7FFFFFFF), b"1e308", b"\xa3\x95\x80", b"\0\0", b"\n", b",",
-)  # fmt: skip
+    b"\xff" * 4,
+    b"\xff" * 8,
+    b"\0" * 8,
+    b"\x7f" * 8,
+    struct.pack("<d", 1e308),
+    struct.pack("<f", 3e38),
+    struct.pack("<d", np.nan),
+    struct.pack("<i", -1),
+    struct.pack("<Q", 1 << 63),
+    struct.pack("<I", 0x7FFFFFFF),
+    b"1e308",
+    b"\xa3\x95\x80",
+    b"\0\0",
+    b"\n",
+    b",",
+)
 
 
 def pick(rng: Generator, choices: Any) -> Any:
@@ -129,14 +211,19 @@ def of_toml(rng: Generator, text: str) -> bytes:
         if kind <= 3 and equals:
             lines[i] = f"{name} = {pick(rng, TOML)}"
         elif kind == 4 and equals:
-            lines[i] = f"{pick(rng, ('x', 'gyro', 'board', 'columns', 'calibration', 'a.b.c', chr(34) + '9' * 9 + chr(34)))} = {value}"
+            lines[i] = (
+                f"{pick(rng, ('x', 'gyro', 'board', 'columns', 'calibration', 'a.b.c', chr(34) + '9' * 9 + chr(34)))} = {value}"
+            )
         elif kind == 5:
             lines.insert(int(rng.integers(len(lines))), lines[i])
         elif kind == 6:
             del lines[i]
             lines = lines or [""]
         else:
-            lines[i] = pick(rng, ("[columns]", "[gyro]", "[board]", "[[instruments]]", "[on_ground]", "[changes]", "x = [", "\x00", "#"))
+            lines[i] = pick(
+                rng,
+                ("[columns]", "[gyro]", "[board]", "[[instruments]]", "[on_ground]", "[changes]", "x = [", "\x00", "#"),
+            )
     raw = "\n".join(lines).encode()
     return of_bytes(rng, raw) if rng.random() < 0.2 else raw
 
@@ -185,9 +272,18 @@ def of_array(rng: Generator, values: Any) -> Any:
     elif kind == 6:
         made = pick(rng, (made.T, made.ravel(), made[None], np.repeat(made, 2, axis=0)))
     elif kind == 7:
-        made = pick(rng, (made.astype("U5"), made.astype(object), *((made.astype("f4"), made.astype("i4"), made + 1j, made > 0) if made.dtype.kind == "f" else ())))
+        made = pick(
+            rng,
+            (
+                made.astype("U5"),
+                made.astype(object),
+                *((made.astype("f4"), made.astype("i4"), made + 1j, made > 0) if made.dtype.kind == "f" else ()),
+            ),
+        )
     else:
-        made = pick(rng, (np.zeros(0), np.array("text"), np.array(["a", 1.0], object), np.zeros((2, 3, 4)), np.array(5.0)))
+        made = pick(
+            rng, (np.zeros(0), np.array("text"), np.array(["a", 1.0], object), np.zeros((2, 3, 4)), np.array(5.0))
+        )
     return made
 
 

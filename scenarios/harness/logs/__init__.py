@@ -44,10 +44,10 @@ def read(
     LogError      one line: a file that is not there, of an unknown kind, or that cannot be believed
     """
     with files.reading(path, LogError):
-        if not path.is_dir():
-            files.check(path, "log")
-        if reference is not None and not reference.is_dir():
-            files.check(reference, "reference")
+        _check(path, "log")
+        if reference is not None:
+            with files.reading(reference, LogError):
+                _check(reference, "reference")
         if columns is None and vectors.is_reference(path):
             return _printable(checks.mended(vectors.read(path, reference), path))
         log = _read(path, None if columns is None else column_map.load(columns), imu)
@@ -57,10 +57,18 @@ def read(
     return _printable(log)
 
 
+def _check(path: Path, what: str) -> None:
+    """Refuse what is neither a file nor a folder; LogError."""
+    if not path.is_dir():
+        files.check(path, what)
+
+
 def _printable(log: RecordedLog) -> RecordedLog:
     """`log` with what it says in words of the file, its name and those of its columns, fit for a terminal."""
     reference = log.reference and replace(log.reference, name=printable(log.reference.name))
-    repairs, notes = (tuple(printable(line, files.LONGEST_LINE) for line in lines) for lines in (log.repairs, log.notes))
+    repairs, notes = (
+        tuple(printable(line, files.LONGEST_LINE) for line in lines) for lines in (log.repairs, log.notes)
+    )
     return replace(log, name=printable(log.name), repairs=repairs, notes=notes, reference=reference)
 
 

@@ -66,10 +66,14 @@ def _content(path: Path) -> dict[str, Any]:
     try:
         content = sandbox.call("scipy.io:loadmat", path, squeeze_me=True)
     except sandbox.TooLong:
-        raise LogError(f"{path}: cannot be read: the MATLAB reader did not come back in {sandbox.LONGEST_S:g} s") from None
+        raise LogError(
+            f"{path}: cannot be read: the MATLAB reader did not come back in {sandbox.LONGEST_S:g} s"
+        ) from None
     except sandbox.TooLarge as error:
         size, most = files.size(path.stat().st_size), files.size(int(str(error)))
-        raise LogError(f"{path}: {size}, but its content takes more than {most} of memory: damaged, or no log") from None
+        raise LogError(
+            f"{path}: {size}, but its content takes more than {most} of memory: damaged, or no log"
+        ) from None
     except sandbox.Crashed:
         raise LogError(f"{path}: cannot be read: the MATLAB reader crashed on it (the file is damaged)") from None
     except sandbox.Failed as error:  # scipy raises whatever its parser meets in a file cut off or foreign
