@@ -7,7 +7,9 @@ raises over the content becomes one line that names the file.
 
 import gzip
 import os
+import re
 import stat
+import tomllib
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,11 +22,12 @@ from numpy.typing import NDArray
 from sim.wording import described, printable
 
 LARGEST_FILE = 2 << 30  # bytes of a file that is read as a whole
-LARGEST_SETTING = 4 << 20  # of one that a person writes: a column map, a part, a sensor suite, a manifest
+LARGEST_SETTING = 1 << 20  # of one that a person writes: a column map, a part, a sensor suite, a manifest
 GROWS, FREELY = 100, 64 << 20  # what is packed grows to so many times its size at most, or to so many bytes
 LARGEST_NUMBER = 1e100  # beyond it, or infinite, is no number: no sensor reads it, and its square overflows
 LONGEST_LINE = 1000  # characters of a message; names of columns are part of it
 _PIECE = 1 << 20
+_DEEP = re.compile(r"""(?:\.[ \t]*(?:"[^"\n]*"|'[^'\n]*'|[\w-]+)[ \t]*){64}""")
 _KINDS = (
     (stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
     (stat.S_ISSOCK, "a socket"),
@@ -52,8 +55,9 @@ def check(path: Path, what: str = "file") -> None:
 
 def read(path: Path, what: str = "file", largest: int = LARGEST_FILE) -> bytes:
     """All of the file; ValueError where it cannot be read, or has more than `largest` bytes."""
-    raw = head(path, largest + 1, what)
-    if len(raw) > largest:
+    check(path, what)
+    raw = b"" if os.path.getsize(path) > largest else head(path, largest + 1, what)
+    if len(raw) > largest or (not raw and os.path.getsize(path) > largest):
         raise ValueError(f"{path}: more than {size(largest)}, which is the most that a {what} may have")
     return raw
 
@@ -75,6 +79,13 @@ def text(path: Path, what: str) -> str:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: no text in UTF-8: {described(error)}") from None
+
+
+def toml(written: str) -> dict[str, Any]:
+    """Contents of a TOML text; ValueError where it is none, or has keys of so many parts that reading never ends."""
+    if _DEEP.search(written):
+        raise ValueError("a key of more than 64 parts")
+    return tomllib.loads(written)
 
 
 def unpacked(path: Path, raw: bytes) -> bytes:

@@ -14,14 +14,13 @@ sheet, or says ``typical`` where that has none.  What a file leaves out is perfe
 
 import math
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, get_type_hints
 
-from sim.files import check, reading
+from sim.files import check, reading, toml
 from sim.files import text as text_of
 from sim.params import near_misses, shown, typed, unit_of
 from sim.sensors.accelerometer import AccelerometerParams
@@ -136,7 +135,7 @@ def read_toml(file: str, text: str) -> dict[str, Any]:
     """Contents of the TOML `text`; ValueError that names `file` and where it is wrong."""
     try:
         with reading(file):
-            return tomllib.loads(text)
+            return toml(text)
     except ValueError as error:  # also of a whole number with thousands of digits
         raise ValueError(f"{file}: not TOML: {' '.join(str(error).split())}") from None
 

@@ -82,10 +82,12 @@ COLUMNS = {
     **{f"v{a}": FLIGHT.v_e[np.maximum(_AT, 0), i] for i, a in enumerate("ned")},
     "latitude_deg": FLIGHT.geodetic[np.maximum(_AT, 0), 0],
     "longitude_deg": FLIGHT.geodetic[np.maximum(_AT, 0), 1],
-    "mag_x_ut": 21.0 + INERTIAL["t"], "mag_y_ut": 1.2 + 0.0 * INERTIAL["t"], "mag_z_ut": 43.0 - INERTIAL["t"],
+    "mag_x_ut": 21.0 + INERTIAL["t"],
+    "mag_y_ut": 1.2 + 0.0 * INERTIAL["t"],
+    "mag_z_ut": 43.0 - INERTIAL["t"],
     "airspeed": 13.0 + 0.1 * INERTIAL["t"],
     **ATTITUDE,
-}  # fmt: skip
+}
 
 
 def text(columns: dict[str, Any], delimiter: str = ",") -> str:
@@ -127,9 +129,15 @@ def _records(name: str, pieces: list[bytes]) -> Target:
 
 def _matlab() -> Target:
     content = {
-        "t": COLUMNS["t"], "gyro": FLIGHT.rate, "acc": FLIGHT.force, "gps": {"vn": COLUMNS["vn"], "ve": COLUMNS["ve"]},
-        "label": np.array(["one", "two"], object), "roll": _ROLL, "pitch": _PITCH, "yaw": _YAW,
-    }  # fmt: skip
+        "t": COLUMNS["t"],
+        "gyro": FLIGHT.rate,
+        "acc": FLIGHT.force,
+        "gps": {"vn": COLUMNS["vn"], "ve": COLUMNS["ve"]},
+        "label": np.array(["one", "two"], object),
+        "roll": _ROLL,
+        "pitch": _PITCH,
+        "yaw": _YAW,
+    }
 
     def saved(data: dict[str, Any], packed: bool) -> bytes:
         file = io.BytesIO()
@@ -222,6 +230,7 @@ def _map() -> Target:
     def make(folder: Path) -> None:
         (folder / "log.csv").write_text(text(COLUMNS))
         (folder / "my.toml").write_text(MAP)
+        column_map.parameters()  # makes every estimator, which may compile for a while
 
     def read(path: Path) -> Any:
         column_map.load(path)
@@ -283,17 +292,33 @@ def recorded() -> Flight:
     rows["mag_b_ut"], rows["air_new"][::5], rows["airspeed_m_s"] = (21.0, 1.0, 43.0), 1, 13.0
     log.truth["R_eb"], log.truth["phase"], log.truth["v_e_m_s"][:, 0] = FLIGHT.R_eb[:60], Phase.FLYING, 14.0
     manifest = {
-        "scenario": "hand_launch", "seed": 3,
+        "scenario": "hand_launch",
+        "seed": 3,
         "config": {
-            "suite": "generic", "sensors": {"gyro.bias_deg_s": 1.0}, "files": {}, "aircraft": "endurance", "duration_s": 1.2,
+            "suite": "generic",
+            "sensors": {"gyro.bias_deg_s": 1.0},
+            "files": {},
+            "aircraft": "endurance",
+            "duration_s": 1.2,
             "estimator_params": {"calibration.offset_b_ut": [1.0, 2.0, 3.0]},
-            "air": {"wind_m_s": 2.0, "wind_from_deg": 160.0, "shear": 0.1, "gusts": [], "turbulence_w20_m_s": 3.0, "thermals": []},
+            "air": {
+                "wind_m_s": 2.0,
+                "wind_from_deg": 160.0,
+                "shear": 0.1,
+                "gusts": [],
+                "turbulence_w20_m_s": 3.0,
+                "thermals": [],
+            },
         },
-        "known": {"gps_latency_s": {"value": 0.2, "source": "set"}, "gps_stamped": {"value": True, "source": "data sheet"}},
+        "known": {
+            "gps_latency_s": {"value": 0.2, "source": "set"},
+            "gps_stamped": {"value": True, "source": "data sheet"},
+        },
         "verdict": [{"name": "survived", "unit": "", "measured": 1.0, "sense": ">=", "limit": 1.0, "passed": True}],
         "on_ground": {"t_s": 1.0, "dt_s": 2.0, "gyro_b_rad_s": [0.0, 0.0, 0.0], "force_b_m_s2": [0.0, 0.0, -9.8]},
-        "launch_latitude_deg": 47.0, "launch_longitude_deg": 8.0,
-    }  # fmt: skip
+        "launch_latitude_deg": 47.0,
+        "launch_longitude_deg": 8.0,
+    }
     return Flight(log, 0.02, 0.1, Outcome.COMPLETED, "course", "", (Event(0.1, "released"),), manifest)
 
 
@@ -369,7 +394,7 @@ def _recording(name: str, scratch: Path) -> Target:
     saved = _saved(scratch / "saved")
 
     def make(folder: Path) -> None:
-        (folder / recording.PARQUET).write_bytes(saved.raw)
+        (folder / (recording.PARQUET if name == recording.MANIFEST else name)).write_bytes(saved.raw)
         if name == recording.MANIFEST:
             (folder / name).write_text(json.dumps(saved.manifest))
 

@@ -44,10 +44,10 @@ def read(
     LogError      one line: a file that is not there, of an unknown kind, or that cannot be believed
     """
     with files.reading(path, LogError):
-        if not path.is_dir():
-            files.check(path, "log")
-        if reference is not None and not reference.is_dir():
-            files.check(reference, "reference")
+        _check(path, "log")
+        if reference is not None:
+            with files.reading(reference, LogError):
+                _check(reference, "reference")
         if columns is None and vectors.is_reference(path):
             return _printable(checks.mended(vectors.read(path, reference), path))
         log = _read(path, None if columns is None else column_map.load(columns), imu)
@@ -55,6 +55,12 @@ def read(
             with files.reading(reference, LogError):
                 log = _against(log, reference)
     return _printable(log)
+
+
+def _check(path: Path, what: str) -> None:
+    """Refuse what is neither a file nor a folder; LogError."""
+    if not path.is_dir():
+        files.check(path, what)
 
 
 def _printable(log: RecordedLog) -> RecordedLog:

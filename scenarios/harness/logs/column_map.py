@@ -45,6 +45,7 @@ from scenarios.harness.logs.recorded import LogError
 from scenarios.harness.logs.units import UNITS
 from scenarios.harness.plugins import near_misses
 from sim import files
+from sim.wording import printable
 
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
 Kind = Literal["truth", "filter", "firmware"]
@@ -117,7 +118,7 @@ def load(spec: str | Path) -> ColumnMap:
 
 def _loaded(path: Path) -> ColumnMap:
     try:
-        data = tomllib.loads(files.text(path, "column map"))
+        data = files.toml(files.text(path, "column map"))
     except tomllib.TOMLDecodeError as error:
         raise LogError(f"{path}: {' '.join(str(error).split())}") from error
     for key in data:
@@ -199,12 +200,17 @@ def _meaning(entry: Any, where: str) -> Meaning:
 
 def _shown(entry: Any) -> str:
     if isinstance(entry, dict):
-        return "{ " + ", ".join(f"{k} = {v!r}" for k, v in entry.items()) + " }"
-    return repr(entry)
+        return printable("{ " + ", ".join(f"{k} = {v!r}" for k, v in entry.items()) + " }", 200)
+    return printable(repr(entry), 200)
+
+
+def _finite(value: float) -> bool:
+    """Whether it is a number that can be worked with: not infinite, and no whole number beyond all others."""
+    return abs(value) < files.LARGEST_NUMBER
 
 
 def _number(value: Any, key: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not _finite(value):
         raise LogError(f"{where}: {key} = {value!r} must be a number")
     return float(value)
 
@@ -306,28 +312,32 @@ def _known(data: Mapping[str, Any], path: Path) -> dict[str, Known]:
         for spelled, value in entries.items():
             name = str(_OLDER_NAMES.get(spelled, spelled))
             if name == "calibration":  # dotted keys make a table of it
+                if not isinstance(value, dict):
+                    raise LogError(f"{path}: [{table}] calibration = {_shown(value)}: must be a table")
                 found |= {f"calibration.{n}": Known(v, "log", path.name) for n, v in dict(value).items()}
                 continue
-            if name not in PROPERTIES and name not in _parameters():
-                possible = {*PROPERTIES, *_parameters()}
+            if name not in PROPERTIES and name not in parameters():
+                possible = {*PROPERTIES, *parameters()}
                 raise LogError(f"{path}: [{table}] {name}: no such property: {near_misses(name, possible)}")
             endless = name.endswith(("full_scale_rad_s", "full_scale_m_s2")) and value == math.inf
-            if not isinstance(value, int | float) or not (math.isfinite(value) or endless):
+            if not isinstance(value, int | float) or not (_finite(value) or endless):
                 raise LogError(f"{path}: [{table}] {name} = {value!r} must be a number, true or false")
             found[name] = Known(value, "log", path.name)
     withheld = data.get("withheld", [])
     if not isinstance(withheld, list):
         raise LogError(f'{path}: withheld must be a list of properties, as in withheld = ["gps_rate_hz"]')
     for name in withheld:
-        if name not in PROPERTIES or name in found:
-            why = "it has a value too" if name in found else near_misses(str(name), PROPERTIES)
+        if not isinstance(name, str) or name not in PROPERTIES or name in found:
+            why = (
+                "it has a value too" if isinstance(name, str) and name in found else near_misses(str(name), PROPERTIES)
+            )
             raise LogError(f"{path}: withheld {name!r}: {why}")
         found[name] = Known(PROPERTIES[name].assumed, "withheld", path.name)
     return found
 
 
 @lru_cache(maxsize=1)
-def _parameters() -> frozenset[str]:
+def parameters() -> frozenset[str]:
     """Names of the parameters of every registered estimator that can be loaded here."""
     from dataclasses import is_dataclass
 

@@ -30,6 +30,7 @@ NOTHING = frozenset(
 )
 LARGEST = 512 << 20  # bytes of text
 MOST_LINES, MOST_CELLS, MOST_COLUMNS = 10_000_000, 40_000_000, 10_000
+csv.field_size_limit(LARGEST)  # a cell may be long: what is in it is told, and not that it is
 _SAMPLE = 50  # lines that are looked at
 _DAY_S = 86400.0
 _NO_TIME = "is no number, no time of day (12:34:56.78) and no date (2026-07-02T12:34:56.78)"
@@ -146,7 +147,6 @@ def _cells(path: Path, lines: Sequence[str], delimiter: str) -> list[list[str]]:
         raise LogError(f"{path}: {most} cells, more than the {MOST_CELLS} that can be read: divide the log")
     if (widest := max((line.count(delimiter) + 1 for line in lines), default=0)) > MOST_COLUMNS:
         raise LogError(f"{path}: {widest} cells in a line, more than the {MOST_COLUMNS} columns that can be read")
-    csv.field_size_limit(LARGEST)  # a cell may be long: what is in it is told, and not that it is
     cells = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=delimiter)]
     if len(cells) != len(lines):
         raise LogError(f"{path}: a quotation mark that opens and does not close")
