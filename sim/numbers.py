@@ -9,7 +9,7 @@ import re
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
 _LONGEST = 60  # characters: no number that is meant has more
-RIGHT = "write a plain number, for instance 5, 0.25 or 1e-3"
+RIGHT = "write a plain finite number, for instance 5, 0.25 or 1e-3"
 RIGHT_WHOLE = "write a whole number, for instance 5"
 
 

@@ -21,10 +21,10 @@ from scenarios.harness.validation import validated
 from sim.clock import Rates
 from sim.log import FLOWN_DTYPE, TRUTH_DTYPE
 from sim.numbers import RIGHT, is_odd, number
-from sim.params import dotted_fields, near_misses, require_fitted, shown
+from sim.params import dotted_fields, near_misses, require_fitted, shown, unit_of
 from sim.rng import stream
 from sim.sensors.fitting import own_files
-from sim.wording import brief
+from sim.wording import brief, printable
 
 MOST_BYTES = 2_000_000_000  # of a flight's log, which is held in memory
 ROW_BYTES = sum(dtype.itemsize for dtype in (TRUTH_DTYPE, MEASURED_DTYPE, FLOWN_DTYPE))
@@ -297,7 +297,7 @@ def _dotted(config: FlightConfig) -> list[str]:
 def _refuse_odd(name: str, value: Any) -> None:
     """Refuse text that only Python takes for a number, but where a text is meant: ValueError."""
     if isinstance(value, str) and name not in _TEXTS and is_odd(value):
-        raise ValueError(f"{shown(name, value)}: {RIGHT}")
+        raise ValueError(f"{name} = {printable(value, 60)} {unit_of(name)}".rstrip() + f": {RIGHT}")
 
 
 def _put(data: dict[str, Any], name: str, value: Any) -> None:

@@ -21,6 +21,7 @@ from scenarios.harness.sensor_page import NAMES, Page
 from scenarios.harness.sensor_trial import AtRest, MagneticTrial, Response
 from sim.log import Log
 from sim.sensors import allan
+from sim.wording import plotted
 
 ROW: Final = 4.3  # inches
 WIDTH: Final = 14.0
@@ -70,8 +71,8 @@ def _rows(page: Page) -> list[list[Panel]]:
 
 def _heading(figure: Any, page: Page, height: float) -> None:
     about = page.subject
-    figure.text(0.06, 1.0 - 0.52 / height, about.name, fontsize=25, fontweight="bold", color=INK)
-    figure.text(0.06, 1.0 - 0.8 / height, about.about, fontsize=10.5, color=FAINT)
+    figure.text(0.06, 1.0 - 0.52 / height, plotted(about.name), fontsize=25, fontweight="bold", color=INK)
+    figure.text(0.06, 1.0 - 0.8 / height, plotted(about.about, 160), fontsize=10.5, color=FAINT)
     figure.text(0.965, 1.0 - 0.45 / height, "wingslevel sensors", fontsize=10.5, color=FAINT, ha="right")
 
 

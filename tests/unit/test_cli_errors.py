@@ -1,10 +1,14 @@
 """Bad input on the command line: one clear line, exit code 2, nothing written."""
 
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from scenarios.harness import cli_values
 from scenarios.harness.cli import run
 
 FLY = ("fly", "hand_launch")
@@ -95,3 +99,93 @@ def test_json_into_a_pipe_is_written_into_it(tmp_path: Path) -> None:
         assert b"hand_launch" in os.read(reader, 100_000)
     finally:
         os.close(reader)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("fly", "crosswind", "--duration", "nan"), "'nan': write a plain finite number"),
+        (("fly", "crosswind", "--duration", "\u0663"), "write a plain finite number"),
+        (("fly", "crosswind", "--duration", "1e-320"), "one tick of the loop"),
+        (("fly", "crosswind", "--duration", "36000", "--imu-rate", "200"), "at most 12255 s at 200 Hz, for the log is"),
+        (("fly", "crosswind", "--seed", "9" * 5000), "write a whole number"),
+        (("fly", "crosswind", "--seed", str(2**32)), "must be at most 4294967295"),
+        (("fly", "crosswind", "--set", "duration_s=1_000"), "duration_s = 1_000 s: write a plain finite number"),
+        (("fly", "crosswind", "--set", "seed=0x10"), "seed = 0x10: write a plain finite number"),
+        (("fly", "crosswind", "--set", "gps.latency_s=1e308"), "must be 0, or between 1e-12 and 1e+09 in size"),
+        (("fly", "crosswind", "--set", "gps.latency_s=" + "[" * 5000), "must be a number"),
+        (("fly", "crosswind", "--set", "estimator_params.k_p=[1,NaN]"), "in size"),
+        (("fly", "crosswind", "--set", "board.rest_s=1e9"), "choose at most 600 s"),
+        (("fly", "crosswind", "--set", "suits.nonsense=1"), "unknown parameter 'suits.nonsense'"),
+        (("fly", "crosswind", "--wind", "\u0665@90"), "for instance 5@270"),
+        (("fly", "crosswind", "--gust", "\u0665@1s"), "for instance 4@12s"),
+        (("fly", "crosswind", "--thermals", "\u0665"), "write"),
+        (("fly", "crosswind", "--out", ""), "--out: the text is empty"),
+        (("fly", "crosswind", "--json="), "--json: the text is empty"),
+        (("fly", "crosswind", "--out", "a\0b"), "NUL"),
+        (("fly", "crosswind", "--json", "x" * 256), "x" * 40),
+        (("fly", "crosswind", "--json", "/dev/full"), "cannot write to /dev/full: no space left"),
+        (("check", "crosswind", "--seeds", "\u0660-\u0669"), "0-9 or 0,2,5-7"),
+        (("check", "crosswind", "--seeds", "0-99999999"), "more than 10000 at once"),
+        (("check", "--seeds", "0-9999"), "at most 100000 flights"),
+        (("check", "--workers", "100000"), "choose 1 to"),
+        (("compare", "crosswind", "--estimators", "premerlani,,gyro_only"), "an empty name"),
+        (("replay", "/dev/full"), "a device"),
+        (("replay", "x.csv", "--settle", "inf"), "write a plain finite number"),
+        (("bench", "--seconds", "1e9"), "choose 2 to 3600 s"),
+        (("agree", "/dev/full", "/dev/null"), "a device"),
+    ],
+)
+def test_numbers_and_names_that_cannot_be_are_one_line_and_exit_code_2(
+    arguments: tuple[str, ...], says: str, tmp_path: Path, monkeypatch, capfd
+) -> None:
+    """Before anything is flown or written, and without repeating thousands of characters."""
+    monkeypatch.chdir(tmp_path)
+    assert run(list(arguments)) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("wingslevel: ")
+    assert says in line
+    assert len(line) < 700
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("where", [0, 1])
+def test_quiet_before_or_after_the_command_prints_nothing_but_reports(where: int, tmp_path: Path, capfd) -> None:
+    """The JSON is written all the same."""
+    arguments = ["list", "--json", str(tmp_path / "list.json")]
+    arguments.insert(where, "--quiet")
+    assert run(arguments) == 0
+    assert capfd.readouterr() == ("", "")
+    assert "crosswind" in (tmp_path / "list.json").read_text()
+
+
+def test_quiet_is_forgotten_by_the_next_command(capfd) -> None:
+    """It is a wish for one command."""
+    run(["--quiet", "list"])
+    assert run(["list"]) == 0
+    assert "crosswind" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("complete", "typed", "found"),
+    [
+        (cli_values.scenarios, "hand_launch_g", ["hand_launch_gust"]),
+        (cli_values.estimators, "gyro_only,premer", ["gyro_only,premerlani"]),
+        (cli_values.aircraft, "end", ["endurance"]),
+        (cli_values.suites, "apm", ["apm2"]),
+        (cli_values.autopilots, "d", ["dcm"]),
+        (cli_values.claims, "offset_at", ["offset_at_power_up"]),
+    ],
+)
+def test_completion_of_a_name_is_what_begins_so(complete: Callable, typed: str, found: list[str]) -> None:
+    """Of the last name of a list, too."""
+    assert list(complete(typed)) == found
+
+
+def test_completion_imports_nothing_heavy() -> None:
+    """A key was pressed, and somebody waits."""
+    code = (
+        "import sys; from scenarios.harness import cli, cli_values; cli_values.scenarios(''); cli_values.claims('');"
+        "print([m for m in ('numpy', 'numba', 'jsbsim', 'pyarrow', 'rich') if m in sys.modules])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -13,7 +13,7 @@ import pytest
 from scenarios.harness.cli import run
 from sim.signals import limited
 
-HANGS_S = 60.0  # ten times the longest, on a machine that is busy with other tests
+HANGS_S = 300.0  # a line takes a second; the first with an estimator may compile, on a machine that is busy
 CODES = {0, 1, 2, 3, 130}
 BLOCK = 50
 
@@ -47,13 +47,13 @@ GOOD_VALUES = ("0", "1", "0.5", "2", "5", "50", "200", "true")
 SCENARIOS = ("crosswind", "hand_launch", "turns_180", "stall_spin")
 
 
-def _of(good: tuple[str, ...], odd: tuple[str, ...], odd_share: float = 0.35) -> Callable[[random.Random], str]:
+def _of(good: tuple[str, ...], odd: tuple[str, ...], odd_share: float = 0.15) -> Callable[[random.Random], str]:
     return lambda rng: rng.choice(odd if rng.random() < odd_share else good)
 
 
 def _set(rng: random.Random) -> str:
     name = rng.choice(NO_FIELDS if rng.random() < 0.3 else FIELDS)
-    return f"{name}={rng.choice(ODD_NUMBERS + ODD_TEXTS if rng.random() < 0.5 else GOOD_VALUES)}"
+    return f"{name}={rng.choice(ODD_NUMBERS + ODD_TEXTS if rng.random() < 0.4 else GOOD_VALUES)}"
 
 
 ODD_WINDS = ("nan@270", "5@nan", "\u0663@90", "1e2@4", "-5@90", "5@361", "5@")
