@@ -83,6 +83,24 @@ def test_sinusoidal_rotation_error_falls_with_the_fourth_power_of_the_tick():
     assert errors[1] / errors[2] == pytest.approx(16.0, rel=0.1)
 
 
+def test_rate_that_is_a_parabola_about_every_axis_is_felt_exactly():
+    """Means over ticks of omega x (omega x r) + d(omega)/dt x r, by a quadrature that is exact for a polynomial."""
+    a, b, c = np.array([1.0, -2.0, 0.5]), np.array([30.0, 25.0, -40.0]), np.array([-900.0, 700.0, 1100.0])
+    n, imu_hz = 8, 50
+
+    def omega(t):
+        return a + np.outer(t, b) + np.outer(t * t, c)
+
+    end, h, mean = np.arange(1, n + 1) / imu_hz, 1.0 / imu_hz, 0.0
+    for node, weight in zip(NODES, 0.5 * WEIGHTS, strict=True):
+        t = end + 0.5 * h * (node - 1.0)
+        turning = b + 2.0 * np.outer(t, c)
+        mean = mean + weight * (np.cross(omega(t), np.cross(omega(t), ARM)) + np.cross(turning, ARM))
+    np.testing.assert_allclose(felt(omega, n, imu_hz)[1:], mean[1:], rtol=0, atol=1e-11)  # some eps of 600 m/s^2
+    bulges = 0.5 * h * h / 6.0 * np.abs(c)  # what the parabola has more than a straight line
+    assert (bulges**2 / 5.0).min() * np.abs(ARM).min() > 1e-6  # and what its square adds is seen
+
+
 def acceleration_from_attitude(motion, t_s, arm):
     """R^T d2(R)/dt2 arm, shape (n, 3): from the attitude alone, by the 7-point stencil (error some 1e-10)."""
     step, stencil = 5e-3, (2.0 / 180, -27.0 / 180, 270.0 / 180, -490.0 / 180, 270.0 / 180, -27.0 / 180, 2.0 / 180)
