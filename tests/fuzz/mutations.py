@@ -211,9 +211,8 @@ def of_toml(rng: Generator, text: str) -> bytes:
         if kind <= 3 and equals:
             lines[i] = f"{name} = {pick(rng, TOML)}"
         elif kind == 4 and equals:
-            lines[i] = (
-                f"{pick(rng, ('x', 'gyro', 'board', 'columns', 'calibration', 'a.b.c', chr(34) + '9' * 9 + chr(34)))} = {value}"
-            )
+            other = pick(rng, ("x", "gyro", "board", "columns", "calibration", "a.b.c", '"9 9"'))
+            lines[i] = f"{other} = {value}"
         elif kind == 5:
             lines.insert(int(rng.integers(len(lines))), lines[i])
         elif kind == 6:
