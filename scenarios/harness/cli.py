@@ -379,10 +379,10 @@ def replay(
     calibration: CalibrationOption = None,
     airborne: Annotated[
         float,
-        typer.Option(metavar="M/S", help="Ground speed above which it flies.", parser=number_in(0.0, 1000.0, "m/s")),
+        typer.Option(metavar="M/S", help="Ground speed above which it flies.", parser=number_in(-1e6, 1e6, "m/s")),
     ] = 5.0,
     settle: Annotated[
-        float, typer.Option(metavar="S", help="Not judged after it first flew.", parser=number_in(0.0, 1e6, "s"))
+        float, typer.Option(metavar="S", help="Not judged after it first flew.", parser=number_in(-1e6, 1e6, "s"))
     ] = 10.0,
     out: Annotated[Path, typer.Option(help="Folder for the recordings.")] = FLIGHTS,
     no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,

@@ -118,7 +118,7 @@ CalibrationOption = Annotated[
     typer.Option(
         metavar="S",
         help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]",
-        parser=number_in(0.0, 36000.0, "s"),
+        parser=number_in(-1e6, 1e6, "s"),
     ),
 ]
 ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")]
