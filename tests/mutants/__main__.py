@@ -38,7 +38,7 @@ def arguments() -> argparse.Namespace:
 
 
 def results_so_far(file: Path, again: bool) -> dict[str, dict[str, object]]:
-    """What was found for each flip, by its key; the last line counts."""
+    """What was found for each flip, by its key; the last line counts.  With `again` only what was caught is left."""
     found: dict[str, dict[str, object]] = {}
     if file.exists():
         for line in file.read_text(encoding="utf-8").splitlines():
@@ -80,8 +80,9 @@ def main() -> int:
         trees.put(Tree(ROOT, options.folder / f"job-{job}"))
 
     def attempt(flip: Flip) -> None:
-        if flip.key in done:
-            return
+        listed = (flip.path, flip.text, flip.change) in same
+        if flip.key in done and (done[flip.key]["outcome"] == CAUGHT or not listed):
+            return  # one that was caught is not equivalent, whatever the list says
         tree = trees.get()
         try:
             row = {"key": flip.key, **Trial(tree, near, options.cap, same).of(flip)}
