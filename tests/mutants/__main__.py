@@ -15,6 +15,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from queue import Queue
+from threading import Event
 
 from flips import ROOT, Flip, every_flip, sample
 from nearness import Nearness
@@ -38,7 +39,7 @@ def arguments() -> argparse.Namespace:
 
 
 def results_so_far(file: Path, again: bool) -> dict[str, dict[str, object]]:
-    """What was found for each flip, by its key; the last line counts."""
+    """What was found for each flip, by its key; the last line counts.  With `again` only what was caught is left."""
     found: dict[str, dict[str, object]] = {}
     if file.exists():
         for line in file.read_text(encoding="utf-8").splitlines():
@@ -75,18 +76,22 @@ def main() -> int:
     options.folder.mkdir(parents=True, exist_ok=True)
     kept = options.folder / "results.jsonl"
     done = results_so_far(kept, options.again)
-    near, trees = Nearness(ROOT), Queue[Tree]()
-    for job in range(options.jobs):
-        trees.put(Tree(ROOT, options.folder / f"job-{job}"))
+    near, waiting, stopped = Nearness(ROOT), Queue[Tree](), Event()
+    trees = [Tree(ROOT, options.folder / f"job-{job}") for job in range(options.jobs)]
+    for tree in trees:
+        waiting.put(tree)
 
     def attempt(flip: Flip) -> None:
-        if flip.key in done:
-            return
-        tree = trees.get()
+        listed = (flip.path, flip.text, flip.change) in same
+        if flip.key in done and (done[flip.key]["outcome"] == CAUGHT or not listed):
+            return  # one that was caught is not equivalent, whatever the list says
+        tree = waiting.get()
         try:
             row = {"key": flip.key, **Trial(tree, near, options.cap, same).of(flip)}
         finally:
-            trees.put(tree)
+            waiting.put(tree)
+        if stopped.is_set():  # its tests were ended, which says nothing of the flip
+            return
         done[flip.key] = row
         with kept.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
@@ -98,7 +103,11 @@ def main() -> int:
     try:
         list(pool.map(attempt, flips))
     except KeyboardInterrupt:
-        pool.shutdown(cancel_futures=True)
+        stopped.set()
+        pool.shutdown(wait=False, cancel_futures=True)
+        for tree in trees:
+            tree.stop()
+        pool.shutdown()
         return 130
     rows = [done[flip.key] for flip in flips]
     (options.folder / "report.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")

@@ -32,6 +32,7 @@ class Tree:
         for name in COPIED:
             self._follow(root / name, folder / name)
         self._file = folder / "known.json"
+        self._running: subprocess.Popen[bytes] | None = None
         known = json.loads(self._file.read_text(encoding="utf-8")) if self._file.exists() else {}
         self._seconds: dict[str, float] = known.get("seconds", {})
         self._sound: dict[str, bool] = known.get("sound", {})
@@ -47,6 +48,11 @@ class Tree:
             for copy in _files(target):
                 if copy not in wanted:
                     copy.unlink()
+
+    def stop(self) -> None:
+        """End the tests that run; what ran them finds that they failed."""
+        if self._running is not None and self._running.poll() is None:
+            _end(self._running)
 
     def put(self, flip: Flip) -> bytes:
         """Make the flip; what stood there before."""
@@ -86,7 +92,7 @@ class Tree:
             "HYPOTHESIS_PROFILE": "gate",
         }
         report.unlink(missing_ok=True)
-        process = subprocess.Popen(
+        self._running = process = subprocess.Popen(
             command, cwd=self.folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL, start_new_session=True,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),

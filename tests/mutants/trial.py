@@ -59,12 +59,12 @@ class Trial:
         return SURVIVED, ""
 
     def _groups(self, flip: Flip) -> Iterator[tuple[list[str], float]]:
-        """Test files that are run together, and how long they take, until the time is over."""
+        """Test files that are run together, and how long they take, until the time is over; the nearest always."""
         group: list[str] = []
         length_s = spent_s = 0.0
         for test in self.near.order(flip.path, self.tree.seconds()):
             seconds = self.tree.seconds().get(test, UNKNOWN_S)
-            if spent_s + seconds > self.cap_s:
+            if spent_s + seconds > self.cap_s and self.near.steps(test, flip.path) > 0:
                 continue
             group.append(test)
             length_s, spent_s = length_s + seconds, spent_s + seconds

@@ -1,6 +1,7 @@
 """Trimmed flight: nothing accelerates, forces balance as they must, and what cannot be flown is refused by name."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from sim.jsbsim_model import AIRCRAFT, Model
 from sim.jsbsim_plant import JsbsimPlant, rotation_of
 from sim.log import Log
 from sim.plant import InFlight
-from sim.trim import Trim, accelerations, earth_to_body, surfaces, trim
+from sim.trim import Search, Trim, accelerations, earth_to_body, surfaces, trim
 from sim.truth import gravity_m_s2
 
 NAMES = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
@@ -200,3 +201,14 @@ def test_trim_takes_few_evaluations(model, monkeypatch):
     monkeypatch.setattr(Model, "place", lambda self, *a: (calls.append(1), original(self, *a))[1])
     trim(model, 12.0, HEIGHT_M)
     assert len(calls) <= 25
+
+
+@pytest.mark.parametrize("throttle", [1.0, 1.0 - 2e-5, 0.6])
+def test_jacobian_at_a_bound_is_that_just_inside(model, throttle):
+    """The throttle stops at 1: differences taken beyond it would say that more throttle changes nothing."""
+    search = Search(model, ("throttle", "alpha_rad", "climb_rad", "roll_rad", *surfaces(model)), HEIGHT_M)
+    t = Trim(14.0, 0.03, -0.05, throttle)
+    column = search.jacobian(t, search.remaining(t))[:, 0]
+    less, more = (search.remaining(replace(t, throttle=throttle - d)) for d in (2e-3, 0.0))
+    assert column[0] > 1.0  # m/s^2 of all the throttle
+    np.testing.assert_allclose(column, (more - less) / 2e-3, rtol=0, atol=0.02 * column[0])

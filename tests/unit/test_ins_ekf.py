@@ -76,6 +76,17 @@ def test_flight_in_wind_finds_attitude_heading_and_wind():
     assert estimates["health"][-1] == Health.GOOD
 
 
+def test_fix_shows_in_the_estimate_of_the_tick_in_which_it_arrives():
+    """The filter works in the past, the estimate is of the present: what a fix has corrected reaches it at once."""
+    rows, _ = coordinated(20.0, wind=(3.0, -4.0))
+    whole = replayed(rows)[0]["R_eb"]
+    for k in np.flatnonzero(rows["gps_new"])[-12:]:
+        other = rows.copy()
+        other["gps_v_e_m_s"][k] += [0.4, -0.3, 0.0]
+        changed = np.abs(replayed(other)[0]["R_eb"] - whole).max(axis=(1, 2)) > 0.0
+        assert np.flatnonzero(changed)[0] == k
+
+
 @pytest.mark.parametrize("throw_deg", [-170.0, -60.0, 0.0, 100.0, 180.0])
 def test_throw_with_unknown_heading_aligns_whatever_the_heading(throw_deg):
     """At rest, then thrown: the velocity inside the receiver tells the heading, turned about to any direction."""
