@@ -210,6 +210,7 @@ def check(
     from scenarios.harness import gate
     from scenarios.harness import workers as crew
     from scenarios.harness.ledger import Ledger
+    from scenarios.harness.preflight import in_time
 
     with reporting(json_) as report:
         with usage():
@@ -220,7 +221,8 @@ def check(
             changes |= given({"withheld": withhold})
             if "seed" in changes:
                 raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
-            tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes, keyed=ledger is not None)
+            with in_time(time_limit(flight_timeout)):
+                tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes, keyed=ledger is not None)
             kept = None if ledger is None else Ledger(ledger)
             guard.stage("while it judged", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
@@ -292,6 +294,7 @@ def compare(
     from scenarios.harness import compare as comparing
     from scenarios.harness import gate, handbook
     from scenarios.harness import workers as crew
+    from scenarios.harness.preflight import in_time
 
     with reporting(json_) as report:
         with usage():
@@ -301,7 +304,9 @@ def compare(
             carried = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
             changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
             changes |= given({"withheld": withhold})
-            plan = comparing.prepare(scenario, names_of(estimators, "--estimators"), gate.parse_seeds(seeds), changes)
+            wanted = names_of(estimators, "--estimators")
+            with in_time(time_limit(flight_timeout)):
+                plan = comparing.prepare(scenario, wanted, gate.parse_seeds(seeds), changes)
             guard.stage("while it compared", guard.BROKEN)
             with console.progress("flying", "flights") as advance:
                 compared = comparing.fly(

@@ -175,9 +175,16 @@ _home: str | None = None  # where the command was begun
 
 
 def come_home() -> None:
-    """Go back to the working directory of the command: flight code may have left it, and paths are relative to it."""
+    """Undo what flight code may have done to the process that reports are written by.
+
+    It may have left the working directory, to which paths are relative, and closed the standard streams.
+    """
     if _home is not None:
         os.chdir(_home)
+    for name, descriptor in (("stdout", 1), ("stderr", 2)):
+        stream = getattr(sys, name)
+        if stream is None or getattr(stream, "closed", False):
+            setattr(sys, name, os.fdopen(os.dup(descriptor), "w", encoding="utf-8", errors="backslashreplace"))
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """What is refused before anything is flown or written: names and values that cannot be, each in one line."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from scenarios.harness import guard
@@ -10,8 +11,27 @@ from scenarios.harness.config import FlightConfig, override, resolve
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
+from sim.signals import TimedOut, limited
 
-_BEFORE = "before anything was flown or written; does"
+_PREPARING = "what is flown"
+_LOADING = "while it was loaded, before anything was flown or written"
+
+
+@contextmanager
+def in_time(limit_s: float | None) -> Iterator[None]:
+    """Refuse flight code and scenario files that take longer than `limit_s` to be loaded and constructed.
+
+    Raises
+    ------
+    ValueError      one line, also where they ended the process
+    """
+    if _PREPARING in guard.lost:
+        raise ValueError(f"flight code or a scenario file: the process {guard.lost[_PREPARING].message} {_LOADING}")
+    try:
+        with guard.watched(_PREPARING, None if limit_s is None else limit_s + guard.GRACE_S), limited(limit_s):
+            yield
+    except TimedOut:
+        raise ValueError(f"flight code or a scenario file: took longer than {limit_s:g} s {_LOADING}") from None
 
 
 def prepared(name: str, changes: Mapping[str, Any], *, lenient: bool = False) -> tuple[Scenario, FlightConfig]:
@@ -23,12 +43,10 @@ def prepared(name: str, changes: Mapping[str, Any], *, lenient: bool = False) ->
     ------
     ValueError      one line: what is wrong, and what would be right
     """
-    guard.stage(f"{_BEFORE} scenario {name!r} end it?", guard.USAGE)
     scenario = find(name)
     config = resolve(override(scenario.config, changes))
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
-    guard.stage(f"{_BEFORE} {config.estimator!r} or {config.autopilot!r} end it?", guard.USAGE)
     code = flight_code(config)
     if not lenient:
         require_heard(config, code)

@@ -9,7 +9,7 @@ from estimator.instruments import to_json
 from scenarios.harness import console, guard, viewing
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config
-from scenarios.harness.preflight import prepared
+from scenarios.harness.preflight import in_time, prepared
 from scenarios.harness.recorder import record
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
@@ -74,7 +74,8 @@ def fly(
     ------
     ValueError      one line: scenario, configuration or folder; nothing has been flown or written then
     """
-    scenario, config = prepared(scenario_name, changes)
+    with in_time(limit_s):
+        scenario, config = prepared(scenario_name, changes)
     recording.check_writable(into)
     console.warn_of_faults(scenario.name, config)
     if _FLIGHT in guard.lost:

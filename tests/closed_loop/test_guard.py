@@ -68,6 +68,21 @@ class Unborn:
         return LEVEL
 
 
+class Unborn2:
+    def __init__(self):
+        time.sleep(1e6)
+
+    def update(self, m):
+        return LEVEL
+
+
+class Shuts:
+    def update(self, m):
+        sys.stdout.close()
+        sys.stderr.close()
+        return LEVEL
+
+
 class Closes:
     def update(self, m):
         os.closerange(1, 50)
@@ -133,6 +148,20 @@ def test_fly_estimator_that_ends_its_process_before_flying_is_exit_code_2(here: 
     done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Unborn", *QUICK)
     assert (done.returncode, done.stdout) == (2, "")
     assert "ended by itself (exit code 0)" in done.stderr
+
+
+def test_fly_estimator_that_is_never_constructed_is_given_up(here: Path) -> None:
+    """A constructor that hangs is refused when the time is up."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Unborn2", "--flight-timeout", "3", *QUICK)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "took longer than 3 s while it was loaded" in done.stderr
+
+
+def test_fly_estimator_that_closes_the_streams_is_reported_all_the_same(here: Path) -> None:
+    """What is printed after the flight goes where it belongs."""
+    done = wingslevel(here, "fly", "crosswind", "--estimator", "own.py:Shuts", "--set", "duration_s=2", "--no-rerun")
+    assert done.returncode == 1
+    assert "recording   flights/crosswind-Shuts-seed0" in done.stdout
 
 
 def test_fly_estimator_that_writes_to_every_descriptor_leaves_the_json_whole(here: Path) -> None:
