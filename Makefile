@@ -38,8 +38,10 @@ test: lint  ## set up, lint, and run all tests
 proofs: venv  ## the long proofs: hundreds of command lines, kills and bent files
 	$(BIN)/pytest -n $(WORKERS) -m long
 
-fuzz: venv  ## search on where the tests draw examples: others each time, twenty times as many
+fuzz: venv  ## search on where the tests draw examples: an hour, with others each time
 	HYPOTHESIS_PROFILE=explore $(BIN)/pytest -n $(WORKERS) -m hypothesis
+	@end=$$(( $$(date +%s) + 3600 )); while [ $$(date +%s) -lt $$end ]; do \
+		WINGSLEVEL_FUZZ_SEED=$$(date +%s) $(BIN)/pytest -n $(WORKERS) -m long tests/fuzz || exit 1; done
 
 mutants: venv  ## are the tests tested? 200 flipped signs and comparisons, one by one; takes hours, goes on where it was
 	nice $(BIN)/python tests/mutants --number 200 --seed 1 --jobs $(WORKERS)
