@@ -8,6 +8,7 @@ import tomllib
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -48,6 +49,14 @@ def test_committed_model_equals_what_build_writes(name):
         assert NUMBER.sub("#", committed) == NUMBER.sub("#", text)
         was, now = (np.array(NUMBER.findall(t), float) for t in (committed, text))
         np.testing.assert_allclose(now, was, rtol=1e-4, atol=2e-4)
+
+
+def test_write_puts_every_file_into_the_folder_of_the_aeroplane(tmp_path, monkeypatch):
+    """What was rendered, to the letter, and nothing else."""
+    files = {"kite.xml": "<fdm_config/>\n", "motor.xml": "<motor name='\u00b5'/>\n"}
+    monkeypatch.setattr(builder, "render", lambda _design: files)
+    builder.write(SimpleNamespace(folder=tmp_path))
+    assert {file.name: file.read_text(encoding="utf-8") for file in tmp_path.iterdir()} == files
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -77,6 +77,14 @@ def test_motion_derivatives_agree_with_central_differences(motion):
 
 
 @moving
+def test_motion_begins_at_its_height_above_the_launch_point(motion):
+    """Down is positive; whatever moves begins above the origin, the hover half a metre beside it."""
+    north_m, east_m, down_m = motion.at(np.zeros(1)).p_e_m[0]
+    assert down_m == pytest.approx(-motion.height_m, rel=0, abs=1e-12)
+    assert math.hypot(north_m, east_m) < 0.5
+
+
+@moving
 def test_motion_attitude_is_a_rotation(motion):
     """Every attitude is orthogonal with determinant 1."""
     R_eb = motion.at(T_S).R_eb

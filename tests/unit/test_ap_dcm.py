@@ -8,7 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.ap_dcm import JULY_2013, STATE_DTYPE, ApDcm, ApDcm2013, ApDcmParams, Quirk, spin_gain
+from estimator.ap_dcm_wind import learn_wind
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
+from estimator.jit import kernel
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
 from scenarios.harness.plugins import equipped
 from scenarios.harness.replay import make
@@ -84,6 +86,26 @@ def test_wind_is_learnt_in_turns():
     assert np.all(np.isnan(wind[0]))
     np.testing.assert_allclose(wind[-1], [4.0, -3.0, 0.0], rtol=0, atol=0.5)
     assert np.all(np.isnan(run(rows, estimate_wind=False)["wind_e_m_s"]))
+
+
+@kernel
+def call_learn_wind(state):
+    learn_wind(state[0])
+
+
+@pytest.mark.parametrize("from_deg", range(0, 360, 45))
+@pytest.mark.parametrize("yaw_error_deg", [-50.0, 0.0, 20.0])
+def test_wind_from_any_direction_is_found_whatever_the_error_of_yaw(from_deg, yaw_error_deg):
+    """Two velocities and noses 70 degrees apart tell wind, speed and error of yaw; a twentieth is taken each time."""
+    wind = np.array([-6.0 * math.cos(math.radians(from_deg)), -6.0 * math.sin(math.radians(from_deg)), 0.3])
+    state = ApDcm().snapshot()
+    for pair in range(81):
+        attitude = Rotation.from_euler("ZYX", [-70.0 * pair, 8.0, 30.0], degrees=True).as_matrix()
+        state["R_eb"] = Rotation.from_euler("z", yaw_error_deg, degrees=True).as_matrix() @ attitude
+        state["v_e_m_s"] = 13.0 * attitude[:, 0] + wind
+        state["clock_s"] = 20.0 + 2.0 * pair
+        call_learn_wind(state)
+    np.testing.assert_allclose(state["wind_e_m_s"][0], wind * (1.0 - 0.95**80), rtol=0, atol=1e-12)
 
 
 def test_wind_is_learnt_straight_with_an_airspeed_sensor():
@@ -174,6 +196,39 @@ def test_spin_gain_grows_as_fast_rotations_wants_or_is_stuck():
             state["spin_rad_s"] = math.radians(rate_deg_s)
             gains.append(spin_gain(state))
         np.testing.assert_allclose(gains, wanted, rtol=1e-12, atol=0)
+
+
+def corrected(forward_m_s2, speed_m_s, pitch_deg, fly_forward=True):
+    """Proportional correction after two fixes of a steady velocity, pushed forward with that specific force."""
+    rows = np.zeros(11, MEASURED_DTYPE)
+    rows["t_s"], rows["dt_s"] = 0.02 * np.arange(1, 12), 0.02
+    rows["force_b_m_s2"] = [forward_m_s2, 0.0, -9.8]
+    rows["gps_new"][[0, 10]], rows["gps_valid"] = 1, 1
+    rows["gps_v_e_m_s"], rows["gps_speed_m_s"] = [speed_m_s, 0.0, 0.0], speed_m_s
+    estimator = ApDcm(ApDcmParams(fly_forward=fly_forward))
+    state = estimator.snapshot()
+    attitude = Rotation.from_euler("ZYX", [0.0, pitch_deg, 0.0], degrees=True)
+    state["R_eb"] = state["R_euler_eb"] = attitude.as_matrix()
+    estimator.restore(state)
+    estimator.replay(rows)
+    return estimator.snapshot()["omega_p_b"][0, 1]
+
+
+@pytest.mark.parametrize(
+    ("forward_m_s2", "speed_m_s", "pitch_deg", "fly_forward", "part"),
+    [
+        (9.0, 1.0, 10.0, True, 0.5), (9.0, 1.0, -20.0, True, 0.5),
+        (9.0, 5.0, 10.0, True, 1.0), (5.0, 1.0, 10.0, True, 1.0), (9.0, 1.0, 45.0, True, 1.0),
+        (9.0, 1.0, -45.0, True, 1.0), (9.0, 1.0, 10.0, False, 1.0),
+    ],
+)  # fmt: skip
+def test_throw_halves_the_correction_of_an_aeroplane_that_is_slow(
+    forward_m_s2, speed_m_s, pitch_deg, fly_forward, part
+):
+    """Pushed by 7 m/s^2 or more, below 3 m/s, within 30 degrees of pitch: half of what the sine of the error asks."""
+    tilt = math.atan2(forward_m_s2, 9.8) - math.radians(pitch_deg)
+    expected = part * ApDcmParams().kp * math.sin(tilt)
+    assert corrected(forward_m_s2, speed_m_s, pitch_deg, fly_forward) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("quirks", [(), (Quirk.DECAY_PER_SAMPLE,)])

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.ins_ekf import STATE_DTYPE, InsEkf, InsEkfParams
+from estimator.ins_ekf_flight import doubt_heading, turn_heading
 from estimator.ins_ekf_kernels import (
     BIAS,
     FORCE,
@@ -28,6 +29,7 @@ from estimator.ins_ekf_kernels import (
     turn_in_body,
     turn_in_earth,
 )
+from estimator.jit import kernel
 
 PARAMS = InsEkfParams(gps_filter_s=1.0, gps_latency_s=0.3, gps_latency_sigma_s=0.0)  # a receiver that filters
 GYRO, FORCE_B = np.array([0.6, -0.9, 1.3]), np.array([1.5, -2.0, -13.0])
@@ -234,3 +236,45 @@ def test_state_record_has_every_part_of_the_error():
     order = sorted([(TILT, 3), *((first, count) for _, first, count in VECTORS)])
     assert [first for first, _ in order] == [sum(c for _, c in order[:i]) for i in range(len(order))]
     assert sum(count for _, count in order) == N == STATE_DTYPE["P"].shape[0]
+
+
+@kernel
+def call_doubt_heading(state, sigma_rad):
+    doubt_heading(state[0], sigma_rad)
+
+
+@kernel
+def call_turn_heading(state, angle_rad):
+    turn_heading(state[0], angle_rad)
+
+
+def test_doubted_heading_turns_both_velocities_with_it():
+    """Of a heading unknown by 0.2 rad the velocities are as unknown, square to themselves, and wholly correlated."""
+    state = some_state()
+    before = state["P"][0].copy()
+    call_doubt_heading(state, 0.2)
+    tiny_rad, turned = 1e-6, np.zeros(N)
+    turn = Rotation.from_rotvec([0.0, 0.0, tiny_rad])
+    turned[TILT + 2] = 1.0
+    for name, first in (("v_e_m_s", VEL), ("lagged_v_e_m_s", LAG)):
+        turned[first : first + 3] = (turn.apply(state[name][0]) - state[name][0]) / tiny_rad
+    np.testing.assert_allclose(state["P"][0] - before, 0.04 * np.outer(turned, turned), rtol=0, atol=1e-4)
+
+
+def test_turned_heading_turns_all_that_is_in_earth_axes_and_its_covariance():
+    """Attitude, velocities, wind and the nose at the start by one rotation about down, P by it on both sides."""
+    state, angle_rad = some_state(), 2.2
+    for name, numbers in (("lagged_rate_m_s2", [0.4, -0.7, 0.2]), ("nose_at_start", [0.6, 0.7, 0.1])):
+        state[name] = numbers[: state[name].shape[1]]
+    before = state.copy()
+    call_turn_heading(state, angle_rad)
+    about = Rotation.from_rotvec([0.0, 0.0, angle_rad]).as_matrix()
+    np.testing.assert_allclose(state["R_filter_eb"][0], about @ before["R_filter_eb"][0], rtol=0, atol=1e-12)
+    for name in ("v_e_m_s", "lagged_v_e_m_s", "lagged_rate_m_s2", "wind_e_m_s", "nose_at_start"):
+        expected = np.array(before[name][0])
+        expected[:2] = about[:2, :2] @ expected[:2]
+        np.testing.assert_allclose(state[name][0], expected, rtol=0, atol=1e-12, err_msg=name)
+    T = np.eye(N)
+    for first in (TILT, VEL, LAG, WIND_NE):
+        T[first : first + 2, first : first + 2] = about[:2, :2]
+    np.testing.assert_allclose(state["P"][0], T @ before["P"][0] @ T.T, rtol=0, atol=1e-12)

@@ -198,6 +198,19 @@ def test_yaw_meets_the_velocity_through_the_air_once_the_wind_is_known():
     assert heading_rad(without.replay(rows)["R_eb"][-1]) == pytest.approx(course, rel=0, abs=math.radians(1.0))
 
 
+@pytest.mark.parametrize(
+    ("yaw_deg", "found"),
+    [(0.0, True), (14.0, True), (-14.0, True), (16.0, False), (-50.0, False), (80.0, False), (-85.0, False)],
+)
+def test_yaw_is_found_where_the_nose_is_near_the_velocity_alone(yaw_deg, found):
+    """Nothing is corrected: within 15 degrees it counts as found after a second; further off, or square, never."""
+    still = MatrixPilotParams(k_p_rp=0.0, k_i_rp=0.0, k_p_yaw=0.0, k_i_yaw=0.0, estimate_wind=False)
+    estimator = started(still, R_eb=from_euler(0.0, 0.0, math.radians(yaw_deg)))
+    health = estimator.replay(with_gps(motion(10.0), [12.0, 0.0, 0.0]))["health"]
+    assert health[0] == Health.STARTING
+    assert (health[-1] == Health.GOOD) == found
+
+
 def test_climb_from_height_is_the_change_between_two_reports():
     """Heights 0.5 m lower at every report, 4 Hz: 2 m/s of sink; the first report has no earlier height, and none."""
     rows = with_gps(motion(2.0), [12.0, 0.0, 0.0])
