@@ -74,7 +74,7 @@ def test_truncated_file_is_refused(tmp_path):
     """A file cut off in the middle is no shorter log."""
     path = tmp_path / "B_in.csv.gz"
     path.write_bytes((DATA / "ap_ahrs_dcm" / "A50_in.csv.gz").read_bytes()[:5000])
-    with pytest.raises(LogError, match="cannot be read"):
+    with pytest.raises(ValueError, match="cannot be read"):
         reference.read(path)
 
 

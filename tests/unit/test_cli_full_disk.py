@@ -65,13 +65,13 @@ def test_fly_without_room_for_the_recording_still_judges_and_reports(sizes, capf
     assert [path.name for path in Path().iterdir()] == ["f.json"]
 
 
-def test_fly_without_room_for_the_report_says_so_after_the_verdict(capfd):
-    """The device that is always full: one line, and the recording is kept."""
+def test_fly_without_room_for_the_report_is_refused_before_the_flight(capfd):
+    """The device that is always full: one line, and nothing is flown or written."""
     assert run([*FLY, "--no-rerun", "--json", "/dev/full"]) == 2
     said = capfd.readouterr()
-    assert "hand_launch, premerlani, seed 0" in said.out
-    assert said.err == "wingslevel: cannot write to /dev/full: No space left on device\n"
-    assert len(list(Path("flights").iterdir())) == 1
+    assert said.out == ""
+    assert said.err == "wingslevel: cannot write to /dev/full: no space left on device\n"
+    assert not Path("flights").exists()
 
 
 def test_aircraft_one_report_without_room_does_not_lose_the_other(capfd):

@@ -240,10 +240,10 @@ def test_traceback_of_an_exception_that_cannot_be_printed_is_shown_as_far_as_it_
 @pytest.mark.parametrize(
     ("command", "says"),
     [
-        (("replay", "log.csv", "--estimator", ","), "--estimator ',': name at least one"),
-        (("replay", "log.csv", "--estimator", ""), "--estimator '': name at least one"),
-        (("compare", "bench_rest", "--estimators", " , "), "--estimators ' , ': name at least one"),
-        (("replay", "log.csv", "--withhold", ","), "--withhold ',': name at least one"),
+        (("replay", "log.csv", "--estimator", ","), "--estimator ',': an empty name"),
+        (("replay", "log.csv", "--estimator", ""), "--estimator: the text is empty"),
+        (("compare", "bench_rest", "--estimators", " , "), "--estimators ' , ': an empty name"),
+        (("replay", "log.csv", "--withhold", ","), "--withhold ',': an empty name"),
     ],
 )
 def test_list_that_names_nothing_is_refused(here: Path, capfd, command, says) -> None:
