@@ -131,7 +131,7 @@ def test_readme_verdict_shows_what_the_estimator_is_given(capsys) -> None:
 
 def test_readme_options_of_the_gate_exist(here: Path) -> None:
     """The command that gates a build writes the three reports that it names."""
-    (command,) = (c for c in commands() if c.startswith("wingslevel check --seeds 0-9"))
+    command = next(c for c in commands() if c.startswith("wingslevel check --seeds 0-9"))
     arguments = ["0" if word == "0-9" else word for word in shlex.split(command)[1:]]
     assert run([*arguments, "hand_launch", "--workers", "1"]) in (0, 1)
     assert {"verdict.xml", "verdict.md", "verdict.json"} <= {path.name for path in here.iterdir()}
