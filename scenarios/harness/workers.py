@@ -83,7 +83,7 @@ def processors() -> int:
 def _results(tasks: Sequence[Flyable[_Result]], workers: int, limit_s: float | None) -> Iterator[tuple[int, _Result]]:
     """Number and result of each task, as they come."""
     waiting, lives = deque(range(len(tasks))), [LIVES] * len(tasks)
-    announced = multiprocessing.get_context("spawn").Value("b", compiling.compiled() > 0)
+    announced = multiprocessing.get_context("spawn").Value("b", compiling.compiled() > 0, lock=False)
     crew: list[_Worker[_Result]] = [_Worker(limit_s, announced) for _ in range(workers)]
     try:
         while waiting or any(worker.busy for worker in crew):
@@ -148,18 +148,25 @@ class _Worker(Generic[_Result]):
     def take(self, number: int, task: Flyable[_Result]) -> None:
         """Begin with a task; the time that a new process takes to start does not count."""
         self.number, self._task, self.busy = number, task, True
-        if self._pool is None:
-            # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
-            context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
-            self._extended_s = context.Value("d", 0.0)
-            self._pool = ProcessPoolExecutor(
-                1, mp_context=context, initializer=_set_up, initargs=(self._extended_s, self._told, tracebacks_shown())
-            )
-            with _held_back():
-                self.future = self._pool.submit(os.getpid)
-            self._process = next(iter(set(multiprocessing.active_children()) - others), None)
-        else:
-            self._fly()
+        if self._pool is not None:
+            with contextlib.suppress(BrokenProcessPool):  # it died while it had nothing to do
+                self._fly()
+                return
+            self.end()
+            self.busy = True
+        self._begin()
+
+    def _begin(self) -> None:
+        """Start a process; it begins with the task when it is ready."""
+        # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
+        context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
+        # Without locks: a process that is killed while it holds one would hold up everybody.
+        self._extended_s = context.Value("d", 0.0, lock=False)
+        arguments = self._extended_s, self._told, tracebacks_shown()
+        self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_set_up, initargs=arguments)
+        with _held_back():
+            self.future = self._pool.submit(os.getpid)
+        self._process = next(iter(set(multiprocessing.active_children()) - others), None)
 
     def look(self) -> "_Told[_Result] | _Gone | None":
         """What has become of the task; None while it is not decided."""
@@ -177,12 +184,12 @@ class _Worker(Generic[_Result]):
         try:
             result = future.result()
         except BrokenProcessPool:
-            self._await_end()
-            code = getattr(self._process, "exitcode", None)
-            self.end()
-            return _Gone(False, f"the process that flew it {_how(code)}")
+            return self._gone()
         if self._task is not None:
-            self._fly()
+            try:
+                self._fly()
+            except BrokenProcessPool:
+                return self._gone()
             return None
         self.busy = False
         return _Told(result)
@@ -200,18 +207,20 @@ class _Worker(Generic[_Result]):
     def _fly(self) -> None:
         if self._pool is None or self._task is None:
             return
-        self.future, self._task = self._pool.submit(_fly, self._task, self._limit_s), None
+        self.future = self._pool.submit(_fly, self._task, self._limit_s)
+        self._task = None
         self.deadline_s = None if self._limit_s is None else time.monotonic() + self._limit_s + GRACE_S
 
     def _take_extension_s(self) -> float:
-        with self._extended_s.get_lock():
-            extended_s = float(self._extended_s.value)
-            self._extended_s.value = 0.0
+        extended_s, self._extended_s.value = float(self._extended_s.value), 0.0
         return extended_s
 
-    def _await_end(self) -> None:
+    def _gone(self) -> _Gone:
         if self._process is not None:
             self._process.join(GRACE_S)
+        code = getattr(self._process, "exitcode", None)
+        self.end()
+        return _Gone(False, f"the process that flew it {_how(code)}")
 
 
 @contextlib.contextmanager
@@ -243,8 +252,7 @@ def _set_up(extended_s: Any, told: Any, tracebacks: bool) -> None:
         extended_s.value += seconds
 
     def tell(_progress: compiling.Progress) -> None:
-        with told.get_lock():
-            first, told.value = not told.value, True
+        first, told.value = not told.value, True
         if first:
             console.note(console.COMPILING)
         compiling.on_compile(None)

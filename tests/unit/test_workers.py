@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +49,8 @@ def befall(what: str, folder: Path) -> None:
         pass
     while what == "hangs, deaf":
         signal.signal(signal.SIGALRM, signal.SIG_IGN)
+    if what == "leaves later":
+        threading.Timer(0.3, os._exit, (0,)).start()
     if what == "SystemExit":
         raise SystemExit(0)
     if what == "KeyboardInterrupt":
@@ -95,6 +98,13 @@ def test_task_that_hangs_is_ended_at_its_limit_and_the_others_go_on(tmp_path: Pa
     done = squares(tmp_path, what, limit_s=1.0)
     assert done[2] == (-1, says)
     assert [done[i][0] for i in (0, 1, 3, 4)] == [0, 1, 9, 16]
+
+
+def test_process_that_ends_while_it_waits_costs_no_task(tmp_path: Path) -> None:
+    """What one task left behind in a thread is not the next one's fault: it is flown in a new process."""
+    tasks = [Square(2, 2, "leaves later", ""), Square(3, 0, "", "")]
+    done = fly_each(tasks, 1, lambda _done, _total: None, keep=lambda _i, _result: time.sleep(1.0))
+    assert done == {0: (4, ""), 1: (9, "")}
 
 
 def test_results_are_handed_on_as_they_come(tmp_path: Path) -> None:
