@@ -12,10 +12,10 @@ from sim.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.jsbsim_model import AIRCRAFT, Model
 from sim.linear import ASYMMETRIC, HEIGHT, STATES, SYMMETRIC, LinearModel, linearise, modes
 from sim.performance import measure
-from sim.trim import Trim, trim
+from sim.trim import Trim, accelerations, trim
 
 NAMES = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
-HEIGHT_M = 60.0
+HEIGHT_M, G_M_S2 = 60.0, 9.80665
 FINE_HZ = 2000  # JSBSim integrates to first order: the fastest root, 30 / s, is then off by less than 1 %
 READ = (
     *(f"velocities/{a}-fps" for a in "uvw"),
@@ -195,6 +195,23 @@ def test_derivatives_are_those_written_into_the_model(name):
         block = text.split(f'<function name="aero/{function}">')[1].split("</function>")[0]
         written = float(block.split("<value>")[1].split("</value>")[0])
         assert found[coefficient] == pytest.approx(written, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lift_slope_is_that_of_the_forces(name):
+    """A little more and less angle of attack at the same speed: lift square to the wind, which turns with it."""
+    model = Model(name, FINE_HZ)
+    glide = trim(model, model.airframe["cruise"]["airspeed_m_s"], HEIGHT_M, throttle=0.0)
+    linear = linearise(model, glide, HEIGHT_M)
+    frame = Airframe.of(model, linear)
+    h, lift_n = 1e-3, []
+    for alpha_rad in (glide.alpha_rad - h, glide.alpha_rad + h):
+        t = replace(glide, alpha_rad=alpha_rad)
+        gravity_b = G_M_S2 * np.array([-math.sin(t.pitch_rad), 0.0, math.cos(t.pitch_rad)])
+        x, _, z = frame.mass_kg * (accelerations(model, t, HEIGHT_M)[:3] - gravity_b)
+        lift_n.append(x * math.sin(alpha_rad) - z * math.cos(alpha_rad))
+    slope = (lift_n[1] - lift_n[0]) / (2.0 * h) / frame.pressure_force_n
+    assert coefficients(linear, frame)["CL_alpha"] == pytest.approx(slope, rel=2e-3)  # the drag alone is 1 %
 
 
 @pytest.mark.parametrize("name", NAMES)
