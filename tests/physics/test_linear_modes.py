@@ -12,10 +12,10 @@ from sim.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.jsbsim_model import AIRCRAFT, Model
 from sim.linear import ASYMMETRIC, HEIGHT, STATES, SYMMETRIC, LinearModel, linearise, modes
 from sim.performance import measure
-from sim.trim import Trim, trim
+from sim.trim import Trim, accelerations, trim
 
 NAMES = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
-HEIGHT_M = 60.0
+HEIGHT_M, G_M_S2 = 60.0, 9.80665
 FINE_HZ = 2000  # JSBSim integrates to first order: the fastest root, 30 / s, is then off by less than 1 %
 READ = (
     *(f"velocities/{a}-fps" for a in "uvw"),
@@ -195,6 +195,38 @@ def test_derivatives_are_those_written_into_the_model(name):
         block = text.split(f'<function name="aero/{function}">')[1].split("</function>")[0]
         written = float(block.split("<value>")[1].split("</value>")[0])
         assert found[coefficient] == pytest.approx(written, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_derivatives_are_those_of_the_forces_and_moments(name):
+    """A little more and less of an angle or a control at the same speed; lift turns with the wind."""
+    model, h = Model(name, FINE_HZ), 1e-3
+    glide = trim(model, model.airframe["cruise"]["airspeed_m_s"], HEIGHT_M, throttle=0.0)
+    linear = linearise(model, glide, HEIGHT_M)
+    frame = Airframe.of(model, linear)
+    found, c, s = coefficients(linear, frame), math.cos(glide.alpha_rad), math.sin(glide.alpha_rad)
+
+    def loads(t):
+        """Lift and side force over q S; moments about the stability axes of the glide over q S x span or chord."""
+        gravity_b = G_M_S2 * np.array([-math.sin(t.pitch_rad), 0.0, math.cos(t.pitch_rad)])
+        a = accelerations(model, t, HEIGHT_M)
+        x, side, z = frame.mass_kg * (a[:3] - gravity_b)
+        lift = x * math.sin(t.alpha_rad) - z * math.cos(t.alpha_rad)
+        roll, pitch, yaw = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]) @ frame.inertia_kg_m2 @ a[3:6]
+        of_span, of_chord = 1.0 / frame.span_m, 1.0 / frame.chord_m
+        return np.array([lift, side, roll * of_span, pitch * of_chord, yaw * of_span]) / frame.pressure_force_n
+
+    for by, names in {
+        "alpha_rad": {0: "CL_alpha", 3: "Cm_alpha"},
+        "beta_rad": {1: "CY_beta", 2: "Cl_beta", 4: "Cn_beta"},
+        "aileron": {2: "Cl_aileron", 4: "Cn_aileron"},
+        "elevator": {0: "CL_elevator", 3: "Cm_elevator"},
+        "rudder": {2: "Cl_rudder", 4: "Cn_rudder"},
+    }.items():
+        less, more = (loads(replace(glide, **{by: getattr(glide, by) + d})) for d in (-h, h))
+        slopes = (more - less) / (2.0 * h)
+        for i, coefficient in names.items():  # the drag alone is 1 % of the slope of the lift
+            assert found[coefficient] == pytest.approx(slopes[i], rel=2e-3, abs=1e-5), coefficient
 
 
 @pytest.mark.parametrize("name", NAMES)

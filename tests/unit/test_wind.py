@@ -123,3 +123,38 @@ def test_learn_wind_in_a_change_of_wind_follows_within_two_circles():
     true_wind = np.where(np.arange(192) < 96, 5.0, 5.0j)
     s = fly(heading, true_wind)
     assert abs(complex_of(s["wind_e_m_s"]) - 5.0j) < 2.5
+
+
+def plain_filter(w, c, P, f, v, dt_s):
+    """One fix in a Kalman filter of two complex states, in NumPy: states, covariance, whether it was believed."""
+    P = P + np.diag([0.06**2, 0.6**2]) * dt_s
+    P[0, 0], P[1, 1] = min(P[0, 0].real, 16.0), min(P[1, 1].real, 900.0)
+    H = np.array([[1.0, f]])
+    e = v - w - c * f
+    S = (H @ P @ H.conj().T)[0, 0].real + 1.0 / min(max(dt_s, 1e-3), 1.0)
+    if abs(e) ** 2 > 16.0 * S:
+        P[1, 1] = min(P[1, 1].real + abs(e) ** 2 * min(dt_s / 4.0, 1.0), 900.0)
+        return w, c, P, False
+    K = P @ H.conj().T / S
+    w, c = np.array([w, c]) + K[:, 0] * e
+    return w, c, P - K @ H @ P, True
+
+
+@pytest.mark.parametrize("dt_s", [0.1, 0.25, 1.0, 2.0])
+def test_learn_wind_equals_a_plain_kalman_filter_with_and_without_surprises(dt_s):
+    """Turning and straight, with three fixes that are 9 to 60 m/s off: every number of the belief, at any rate."""
+    rng = np.random.default_rng(5)
+    state, w, c, P = np.zeros(1, STATE), 0j, 0j, np.diag([16.0 + 0j, 900.0])
+    heading, refused = np.cumsum(np.where(np.arange(120) % 40 < 25, 0.3 * min(dt_s, 1.0), 0.0)), 0
+    for k in range(120):
+        f = 0.9 * np.exp(1j * heading[k])
+        v = 4.0 - 3.0j + 12.0 * f * np.exp(0.4j) + complex(*rng.normal(0.0, 0.2, 2))
+        v += {50: 60.0j, 51: 55.0j, 90: -9.0}.get(k, 0.0)
+        learn(state, np.array([f]), np.array([v]), dt_s)
+        w, c, P, believed = plain_filter(w, c, P, f, v, dt_s)
+        refused += not believed
+        s = state[0]
+        found = [complex_of(s["wind_e_m_s"]), complex_of(s["air_m_s"]), complex_of(s["wind_air_covariance"])]
+        np.testing.assert_allclose(found, [w, c, P[0, 1]], rtol=0, atol=1e-9)
+        np.testing.assert_allclose([s["wind_variance"], s["air_variance"]], np.diag(P).real, rtol=0, atol=1e-9)
+    assert refused > 0
