@@ -111,7 +111,7 @@ def _folder_name(py_func: Any, path: str) -> str:
     """
     module = str(py_func.__module__ or "")
     ours = module.partition(".")[0] in OURS
-    return Path(path).stem if ours else re.sub(r"\W", "_", module)[-80:] or "nameless"
+    return Path(path).stem if ours or not module else re.sub(r"\W", "_", module)[-80:]
 
 
 class _Locator:

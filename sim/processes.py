@@ -21,11 +21,16 @@ def die_with_parent() -> bool:
     return ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0) == 0
 
 
-def end_with_parent() -> None:
-    """`die_with_parent`, and where the system does not do that a thread that looks for the parent twice a second."""
-    if die_with_parent():
+def end_with_parent(parent: int) -> None:
+    """End this process when the one with the id `parent`, which started it, ends: at once if it has already.
+
+    By `die_with_parent`, or where the system does not do that by a thread that looks for the parent twice a second.
+    """
+    by_the_system = die_with_parent()
+    if os.getppid() != parent:
+        os._exit(1)
+    if by_the_system:
         return
-    parent = os.getppid()
 
     def watch() -> None:
         while os.getppid() == parent:

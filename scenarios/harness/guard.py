@@ -150,8 +150,9 @@ def _run(command: Callable[[], int]) -> tuple[_Heard, str]:
     signals = [number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN]
     signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     sys.stdout.flush()
-    pid = os.fork()
+    parent, pid = os.getpid(), os.fork()
     if pid == 0:
+        end_with_parent(parent)
         os.close(read)
         _live(command, _Child(write, token), signals)
     os.close(write)
@@ -177,7 +178,6 @@ def _live(command: Callable[[], int], child: _Child, signals: list[signal.Signal
     """The child's life; does not return."""
     global _child
     _child = child
-    end_with_parent()
     code = BROKEN
     try:
         for number in signals:

@@ -162,7 +162,7 @@ class _Worker(Generic[_Result]):
         context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
         # Without locks: a process that is killed while it holds one would hold up everybody.
         self._extended_s = context.Value("d", 0.0, lock=False)
-        arguments = self._extended_s, self._told, tracebacks_shown()
+        arguments = os.getpid(), self._extended_s, self._told, tracebacks_shown()
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_set_up, initargs=arguments)
         with _held_back():
             self.future = self._pool.submit(os.getpid)
@@ -243,10 +243,10 @@ def _how(exitcode: int | None) -> str:
     return "ended by itself" + ("" if exitcode is None else f" (exit code {exitcode})")
 
 
-def _set_up(extended_s: Any, told: Any, tracebacks: bool) -> None:
+def _set_up(parent: int, extended_s: Any, told: Any, tracebacks: bool) -> None:
     """In a new process."""
+    end_with_parent(parent)
     show_tracebacks(tracebacks)
-    end_with_parent()
 
     def extend(seconds: float) -> None:
         extended_s.value += seconds

@@ -37,7 +37,6 @@ NOT_RUN = {
     r"wingslevel check --seeds 0-9 .*": "fifty flights, which tests/closed_loop flies; its options are run below",
     r"wingslevel check --json verdict.json .*": "the same",
     r"wingslevel agree .*": "needs the verdicts of two machines; tests/unit/test_agreement.py writes some",
-    r"nice .venv/bin/python tests/mutants .*": "takes hours",
 }  # fmt: skip
 
 

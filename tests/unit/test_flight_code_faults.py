@@ -254,7 +254,9 @@ def test_list_that_names_nothing_is_refused(here: Path, capfd, command, says) ->
 
 @pytest.mark.parametrize("statement", ["signal.raise_signal(signal.SIGINT)", "swallowed()"])
 @pytest.mark.parametrize("where", ["import", "__init__"])
-def test_ctrl_c_while_flight_code_is_loaded_ends_the_command(here: Path, capfd, where: str, statement: str) -> None:
+def test_ctrl_c_while_flight_code_is_loaded_ends_the_command(
+    here: Path, ctrl_c, capfd, where: str, statement: str
+) -> None:
     """A real one, even one that the code swallows: not the code's fault."""
     head = (
         "import signal\n"
