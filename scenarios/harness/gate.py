@@ -103,7 +103,8 @@ def tell(verdict: Verdict) -> None:
             why = flight.ending if flight.message or flight.broken else failed
             console.line(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red")
     flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))
-    console.last(f"passed: {flights} flights, {pooled} scenarios pooled")
+    missing = f"; {verdict.missing_text}" if verdict.missing else ""
+    console.last(f"passed: {flights} flights, {pooled} scenarios pooled{missing}")
 
 
 def parse_seeds(text: str) -> list[int]:
