@@ -30,7 +30,7 @@ from sim.processes import end_with_parent
 from sim.signals import ENDING, listening, on_extended
 from sim.wording import described, printable
 
-FAILED, USAGE, BROKEN = 1, 2, 3  # exit codes
+FAILED, USAGE, BROKEN, INTERRUPTED = 1, 2, 3, 130  # exit codes
 _COMPLETE = "_WINGSLEVEL_COMPLETE"  # set by a shell that wants half a line completed: nothing is flown
 GRACE_S = 5.0  # what a process gets to end by itself
 _LOOK_S = 0.2
@@ -178,16 +178,21 @@ def _live(command: Callable[[], int], child: _Child, signals: list[signal.Signal
     """The child's life; does not return."""
     global _child
     _child = child
-    code = BROKEN
+    code: int | None = None
     try:
         for number in signals:
             signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
         with listening():
             signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
             code = command()
+    except KeyboardInterrupt:  # before `run` had begun, or after it had ended
+        if code is None:
+            code = INTERRUPTED
+            sys.stderr.write("wingslevel: interrupted\n")
     except BaseException as error:  # `run` answers for all that can be foreseen
         sys.stderr.write(f"wingslevel: internal error: {described(error)}\n")
     finally:
+        code = BROKEN if code is None else code
         _flush()
         _send(done=code)
         os._exit(code)  # without atexit: whatever flight code left there, or in threads, has no say
