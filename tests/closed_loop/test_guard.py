@@ -251,3 +251,14 @@ def test_fly_estimator_that_leaves_the_working_directory_loses_no_report(here: P
     (here / "goes.py").write_text(source, encoding="utf-8")
     wingslevel(here, "fly", "crosswind", "--estimator", "goes.py:Goes", *QUICK[:-1], "v.json")
     assert Path(here, json.loads((here / "v.json").read_text())["recording"]).is_dir()
+
+
+@pytest.mark.parametrize("command", ["bench", "replay"])
+def test_estimator_that_ends_its_process_unwatched_is_exit_code_2(here: Path, command: str) -> None:
+    """Where nobody watches, the parent's own word stands: no command ends well without saying so."""
+    log = ["flights/crosswind-premerlani-seed0"] if command == "replay" else []
+    if log:
+        wingslevel(here, "fly", "crosswind", "--set", "duration_s=2", "--no-rerun")
+    done = wingslevel(here, command, *log, "--estimator", "own.py:Unborn", "--json", "-")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "ended by itself (exit code 0) before anything was flown or written" in done.stderr
