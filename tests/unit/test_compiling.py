@@ -1,5 +1,6 @@
 """While kernels are compiled: one line says so in every command, and Ctrl-C ends it cleanly."""
 
+import importlib
 import io
 import os
 import pty
@@ -35,14 +36,15 @@ def _ctrl_c():
 def kernels(tmp_path, monkeypatch):
     """Makes a kernel that calls another, both new to the cache; or, the second time, known to it."""
     monkeypatch.setattr(kernel_cache, "base", lambda: tmp_path / "cache")
+    monkeypatch.syspath_prepend(tmp_path)
     source = tmp_path / "two.py"
     source.write_text("def inner(x):\n    return x + 1.0\n\n\ndef outer(x):\n    return 2.0 * inner(x)\n")
 
     def make():
-        names = {}
-        exec(compile(source.read_text(), source, "exec"), names)
-        names["inner"] = estimator.jit.kernel(names["inner"])
-        return estimator.jit.kernel(names["outer"])
+        monkeypatch.delitem(sys.modules, "two", raising=False)
+        module = importlib.import_module("two")  # a real one: the compiler looks its kernels up by its name
+        module.inner = estimator.jit.kernel(module.inner)
+        return estimator.jit.kernel(module.outer)
 
     return make
 
