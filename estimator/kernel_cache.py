@@ -5,7 +5,7 @@ Every module with kernels has a folder, named by the module and by a hash over a
 
 A cache is never a reason to fail.  Every file carries its checksum; one that is damaged is thrown away and its kernel
 compiled again.  Where nothing can be written, because the disk is full or the folder is not ours, kernels are compiled
-in memory.  Both are told on one line.
+in memory.  Both print one line.
 """
 
 import hashlib
@@ -152,7 +152,7 @@ class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
 class _Files(IndexDataCacheFile):  # type: ignore[misc]
     """The index and the data files of one function, each with its checksum.
 
-    A data file is named by what it is for, so that processes that write at the same time write the same; it holds its
+    A data file is named by its key, so processes that write at the same time write the same file; it holds its
     key, and is there before the index names it.
     """
 

@@ -132,7 +132,7 @@ def measure(
     seeds       flown of each claim that leaves something to chance; None is from 0 on as many as each claim wants
     advance     is told how many claims are done, of how many
     drawn       whether their pictures are wanted
-    limit_s     longest that one may take, by the clock on the wall
+    limit_s     wall-clock limit of each
     """
     numbers = {c.name: tuple(range(c.seeds) if seeds is None or not c.seeds else seeds) for c in wanted}
     # The long ones first, so that at the end no process waits for another.

@@ -103,7 +103,7 @@ FlightTimeoutOption = Annotated[
     typer.Option(
         "--flight-timeout",
         metavar="S",
-        help="Longest a flight may take, by the clock on the wall. [default: 600]",
+        help="Wall-clock limit of each flight. [default: 600]",
         parser=number_in(0.001, 1e6, "s"),
     ),
 ]

@@ -89,7 +89,7 @@ def _publish(data: Any, stdout: TextIO) -> None:
 def _print(data: Any, stdout: TextIO) -> None:
     try:
         print(json_text(data), file=stdout, flush=True)
-    except BrokenPipeError:  # whoever read it has seen enough: what is still in the buffer goes nowhere, quietly
+    except BrokenPipeError:  # the reader has closed the pipe: drop the rest
         abandon(stdout)
     except OSError as error:
         abandon(stdout)
@@ -189,7 +189,7 @@ def come_home() -> None:
 
 @contextmanager
 def losses() -> Iterator[list[str]]:
-    """Inside the block a report that cannot be written does not end the command: it is told, and the rest goes on.
+    """Inside the block a report that cannot be written prints one line, and the command continues.
 
     What was measured is not lost with the first file that finds no room.  Gives the list of the lines told.
     """
@@ -203,7 +203,7 @@ def losses() -> Iterator[list[str]]:
 
 @contextmanager
 def attempt() -> Iterator[None]:
-    """What cannot be written inside the block is told on one line; outside `losses` it ends the command."""
+    """A file that cannot be written inside the block prints one line; outside `losses` it ends the command."""
     try:
         yield
     except ValueError as problem:

@@ -322,7 +322,7 @@ def _can_be_loaded(name: str) -> bool:
 def fly(plan: Plan, workers: int, advance: Callable[[int, int], None], *, limit_s: float | None = None) -> Comparison:
     """Fly what is planned; `advance` is told how many flights are done, of how many.
 
-    limit_s : longest that a flight may take, by the clock on the wall
+    limit_s : wall-clock limit of each flight
 
     Ctrl-C leaves flights out: the comparison is then of those finished.
     """

@@ -97,7 +97,7 @@ def outcome(text: str) -> None:
 
 def error(message: str) -> None:
     """One line on standard error, never wrapped: ``wingslevel: message``."""
-    if sys.stderr is not None:  # closed by whoever started us: there is nobody to tell
+    if sys.stderr is not None:  # None if it was closed before we started
         sys.stderr.write(f"wingslevel: {printable(message, _LONGEST)}\n")
 
 

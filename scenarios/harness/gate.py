@@ -131,7 +131,7 @@ def parse_seeds(text: str) -> list[int]:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What became of all flights that were asked for.
+    """The result of a check.
 
     flown, resumed : flights that were flown now, and that the ledger held      missing : that were not finished
     """
@@ -164,7 +164,7 @@ def fly_all(
 ) -> Run:
     """Fly and judge all `tasks`, but for those whose verdict `ledger` holds, and keep there what is flown.
 
-    limit_s : longest a flight may take, by the clock on the wall       advance : is told how many are done, of how many
+    limit_s : wall-clock limit of each flight       advance : called with the number done and the total
 
     The verdict is on the flights that were finished: Ctrl-C leaves some out.
     """

@@ -127,7 +127,7 @@ def guarding() -> bool:
 
 
 def publish(text: str) -> bool:
-    """Have the parent write `text` to standard output; False where there is none."""
+    """Have the parent write `text` to standard output; False if unguarded."""
     return _send(out=text)
 
 

@@ -41,7 +41,7 @@ class Ledger:
         check_writable(self.folder)
 
     def find(self, key: str, scenario: str, seed: int) -> FlightVerdict | None:
-        """The verdict kept under the fingerprint `key`; None where there is none."""
+        """The verdict stored for the fingerprint `key`, or None."""
         path = self._path(key, scenario, seed)
         try:
             text = path.read_text(encoding="utf-8")

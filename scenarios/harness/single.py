@@ -68,7 +68,7 @@ def fly(
     """Fly, record below the folder `into`, judge.
 
     rerun : write a Rerun recording too             live : show it in the viewer while it is flown, in real time
-    web : the viewer in a browser                   limit_s : longest it may take, by the clock on the wall
+    web : the viewer in a browser                   limit_s : wall-clock limit
 
     Raises
     ------

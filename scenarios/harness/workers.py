@@ -59,7 +59,7 @@ def fly_each(
 
     Parameters
     ----------
-    limit_s         longest a task may take, by the clock on the wall; None is for ever
+    limit_s         wall-clock limit of each task; None is no limit
     interrupted     whether a result is that of a task that was interrupted: it ends the rest
     keep            is handed each result as it comes, with the number of its task
     advance         is told how many are done, of how many
