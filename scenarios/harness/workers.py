@@ -216,9 +216,10 @@ class _Worker(Generic[_Result]):
         return extended_s
 
     def _gone(self) -> _Gone:
-        if self._process is not None:
-            self._process.join(GRACE_S)
-        code = getattr(self._process, "exitcode", None)
+        code, end_s = None, time.monotonic() + GRACE_S
+        # The pool's own thread may have asked the system first, and not have written the answer down yet.
+        while self._process is not None and (code := self._process.exitcode) is None and time.monotonic() < end_s:
+            time.sleep(0.005)
         self.end()
         return _Gone(False, f"the process that flew it {_how(code)}")
 
