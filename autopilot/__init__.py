@@ -26,4 +26,4 @@ LOW                                                    a climb on the way       
 =========  ==========================================  ==========================  ===================================
 """
 
-AUTOPILOTS = {"dcm": "autopilot.autopilot:DcmAutopilot"}  # name -> "module:Class", made without arguments
+AUTOPILOTS = {"dcm": "autopilot.dcm:DcmAutopilot"}  # name -> "module:Class", made without arguments

@@ -27,9 +27,9 @@ from dataclasses import dataclass
 
 from autopilot.guidance import gps_age, height, is_wind, unit
 from autopilot.stabilise import G_M_S2, far_off
-from estimator.jit import kernel
-from estimator.kernels import clip
-from estimator.screening import AIRSPEED_RANGE_M_S
+from estimator.blocks.kernels import clip
+from estimator.blocks.screening import AIRSPEED_RANGE_M_S
+from estimator.compiler.jit import kernel
 
 
 @dataclass(frozen=True, slots=True)

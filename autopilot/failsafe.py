@@ -37,10 +37,10 @@ from dataclasses import dataclass
 from autopilot.energy import hold_height
 from autopilot.guidance import gps_age, is_fix
 from autopilot.interface import Mode
+from estimator.blocks.screening import GYRO_RANGE_RAD_S
+from estimator.compiler.jit import kernel
 from estimator.interface import Health
-from estimator.jit import kernel
 from estimator.rotation import integrate
-from estimator.screening import GYRO_RANGE_RAD_S
 
 MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW = (int(m) for m in Mode)
 GOOD, POOR = int(Health.GOOD), int(Health.POOR)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 from autopilot.interface import Mode
 from autopilot.stabilise import shorter_way
-from estimator.jit import kernel
-from estimator.kernels import clip
+from estimator.blocks.kernels import clip
+from estimator.compiler.jit import kernel
 
 MOST_M, MOST_M_S = 1e6, 1000.0  # no fix is further from the launch point, or faster
 MOST_WIND_M_S = 100.0  # and no wind is

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from autopilot.energy import hold_height, throttle_for
 from autopilot.guidance import height
 from autopilot.stabilise import G_M_S2
-from estimator.jit import kernel
-from estimator.screening import FORCE_RANGE_M_S2
+from estimator.blocks.screening import FORCE_RANGE_M_S2
+from estimator.compiler.jit import kernel
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from estimator.jit import kernel
-from estimator.kernels import clip
+from estimator.blocks.kernels import clip
+from estimator.compiler.jit import kernel
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The scripted stick: set-points by time since the release; figures for it are in `autopilot.manoeuvres`."""
+"""The scripted stick: set-points by time since the release; figures for it are in `autopilot.figures`."""
 
 import math
 from bisect import bisect_right

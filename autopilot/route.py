@@ -25,8 +25,8 @@ from dataclasses import dataclass
 
 from autopilot.guidance import gps_age, heading_error, is_wind, unit
 from autopilot.stabilise import G_M_S2, shorter_way
-from estimator.jit import kernel
-from estimator.kernels import clip
+from estimator.blocks.kernels import clip
+from estimator.compiler.jit import kernel
 
 
 @dataclass(frozen=True, slots=True)

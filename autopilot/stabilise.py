@@ -18,8 +18,8 @@ Source: Premerlani & Bizard, Direction Cosine Matrix IMU: Theory, "Using DCM in 
 import math
 from dataclasses import dataclass
 
-from estimator.jit import kernel
-from estimator.kernels import clip
+from estimator.blocks.kernels import clip
+from estimator.compiler.jit import kernel
 
 G_M_S2 = 9.80665
 

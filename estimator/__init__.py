@@ -15,8 +15,8 @@ Names
 -----
 A name reads quantity, frame, unit: ``omega_b_rad_s``, ``v_e_m_s``, ``p_e_m``, ``t_s``.  Rotations and
 fractions carry no unit.  Inside: SI and radians.  Degrees live in configuration and in what a person reads,
-always with the suffix; feet and pounds live in ``sim/jsbsim_model.py`` and
-``sim/jsbsim_plant.py`` and end there.
+always with the suffix; feet and pounds live in ``sim/aeroplane/jsbsim_model.py`` and
+``sim/aeroplane/jsbsim_plant.py`` and end there.
 
 Signs
 -----
@@ -44,21 +44,21 @@ from typing import TypeVar
 ESTIMATORS: dict[str, str] = {
     "premerlani": "estimator.premerlani:Premerlani",
     "matrixpilot": "estimator.matrixpilot:MatrixPilot",
-    "ap_dcm": "estimator.ap_dcm:ApDcm",
-    "ap_dcm_2013": "estimator.ap_dcm:ApDcm2013",
+    "ap_dcm": "estimator.ap_dcm.ap_dcm:ApDcm",
+    "ap_dcm_2013": "estimator.ap_dcm.ap_dcm:ApDcm2013",
     "gps_velocity": "estimator.gps_velocity:GpsVelocity",
     "gps_velocity_nose": "estimator.gps_velocity:GpsVelocityNose",
     "gps_velocity_magnetometer": "estimator.gps_velocity:GpsVelocityMagnetometer",
-    "ins_ekf": "estimator.ins_ekf:InsEkf",
+    "ins_ekf": "estimator.ins_ekf.ins_ekf:InsEkf",
     "starlino": "estimator.starlino:Starlino",
     "dilshad": "estimator.dilshad:Dilshad",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
-    "peer_madgwick": "estimator.peers:Madgwick",
-    "peer_mahony": "estimator.peers:Mahony",
-    "peer_vqf": "estimator.peers:Vqf",
-    "peer_imufusion": "estimator.peers:Imufusion",
-    "peer_imufusion_9d": "estimator.peers:Imufusion9D",
+    "peer_madgwick": "estimator.peers.peers:Madgwick",
+    "peer_mahony": "estimator.peers.peers:Mahony",
+    "peer_vqf": "estimator.peers.peers:Vqf",
+    "peer_imufusion": "estimator.peers.peers:Imufusion",
+    "peer_imufusion_9d": "estimator.peers.peers:Imufusion9D",
 }
 """Every estimator that can be named: name -> ``module:Class``, imported only when it flies."""
 

@@ -13,11 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.compiled import BELIEF, Compiled, write_estimate
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
-from estimator.jit import kernel
-from estimator.rotation import integrate, level, renormalise
-from estimator.screening import (
+from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
+from estimator.blocks.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     GYRO_RANGE_RAD_S,
@@ -28,6 +25,9 @@ from estimator.screening import (
     screen_gyro,
     take_rate,
 )
+from estimator.compiler.jit import kernel
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.rotation import integrate, level, renormalise
 
 STATE_DTYPE = dtype_of(
     (*BELIEF, *SCREEN, Column("tilt_from_force", (), "1 where the accelerometer sets the tilt", integer=True))

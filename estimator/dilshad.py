@@ -3,7 +3,7 @@
 Gyros steer (Premerlani's Eqns 16-21); the accelerometer as it is, without a centrifugal term, corrects roll and pitch;
 every 125 ms the tilt-compensated magnetometer (Eqns 5-7) says how far the yaw of the gyros has drifted; and over a long
 time the course from three GPS positions (Eqn 9) corrects what the magnetometer says, declination and leftover iron.
-All errors go through one PI controller (Premerlani's Eqns 28-29).  Iron: `estimator.magnetometer` (Eqn 8).
+All errors go through one PI controller (Premerlani's Eqns 28-29).  Iron: `estimator.blocks.magnetometer` (Eqn 8).
 
 The tilt of Eqns 5 and 6 is the accelerometer's.  That is right for a craft that stands or hovers in the mean.  In a
 coordinated turn the accelerometer feels no bank at all: the vertical part of the field then passes for a horizontal
@@ -55,14 +55,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.compiled import BELIEF, Compiled, write_estimate
-from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
-from estimator.jit import kernel
-from estimator.kernels import wrap
-from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field, turn_to_north, write_calibration
-from estimator.pi import corrected_rate, feed_back, weigh
-from estimator.rotation import integrate
-from estimator.screening import (
+from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
+from estimator.blocks.kernels import wrap
+from estimator.blocks.magnetometer import (
+    FIELD,
+    FIELD_RANGE_UT,
+    Calibration,
+    take_field,
+    turn_to_north,
+    write_calibration,
+)
+from estimator.blocks.pi import corrected_rate, feed_back, weigh
+from estimator.blocks.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     GPS,
@@ -73,6 +77,9 @@ from estimator.screening import (
     refuse,
     screen,
 )
+from estimator.compiler.jit import kernel
+from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.rotation import integrate
 
 HEADING_LIFE_S = 1.0  # a magnetometer silent for longer corrects nothing any more
 STRAIGHT_RAD = math.radians(10.0)  # a nose that has turned further than this since the course was true is in a turn

@@ -1,9 +1,9 @@
 """Gains of the drift controller from a time of recovery, by the linearised loop.
 
-"The practical realities of the wind and gyro saturation favor using weights and gains that are large enough to
-recover in about 10 seconds. In the feedback loop, the DCM algorithm is a nonlinear integrator. Therefore, you can
-select the gains for the linearized equivalent dynamic model of the complete loop."  That model (`estimator.pi`), for
-a small error e of a loop of weight W, is
+"The practical realities of the wind and gyro saturation favor using weights and gains that are large enough to recover
+in about 10 seconds. In the feedback loop, the DCM algorithm is a nonlinear integrator. Therefore, you can select the
+gains for the linearized equivalent dynamic model of the complete loop."  That model (`estimator.blocks.pi`), for a
+small error e of a loop of weight W, is
 
     s^2 + K_P W s + K_I W = 0        natural frequency sqrt(K_I W), damping K_P / 2 sqrt(W / K_I)
 

@@ -6,19 +6,16 @@ An accelerometer feels gravity minus acceleration (Eqn 1), and the attitude carr
 attack and no sideslip is assumed, so the method holds in turns, in wind and in loops, where the centrifugal
 term of the first paper does not.
 
-Lag
----
-A receiver reports velocity filtered and late.  The left side of Eqn 3, and the nose, pass the same filter and are
-recalled from one latency ago, with all corrections that were made since (`estimator.gyro_frame`).  An error found at a
-report is removed evenly until the next one, by 1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
+Lag --- A receiver reports velocity filtered and late.  The left side of Eqn 3, and the nose, pass the same filter and
+are recalled from one latency ago, with all corrections that were made since (`estimator.blocks.gyro_frame`).  An error
+found at a report is removed evenly until the next one, by 1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
 
-Yaw
----
-``course`` and ``nose``: the matrix itself is turned to the nose, which is where the velocity through the air points
-(Eqns 22 to 24 of the paper of 2009, with v_gps - wind for the course).  The wind is learnt in turns
-(`estimator.wind`); as long as none has been flown that is the course over ground.  ``course`` then tells the heading
-of the paper: the matrix is handed out turned by the crab angle.  So Eqn 4 compares along the true heading whatever is
-told; along the course a crab of 23 degrees becomes a tilt in every turn.  ``magnetometer``: to magnetic north.
+Yaw --- ``course`` and ``nose``: the matrix itself is turned to the nose, which is where the velocity through the air
+points (Eqns 22 to 24 of the paper of 2009, with v_gps - wind for the course).  The wind is learnt in turns
+(`estimator.blocks.wind`); as long as none has been flown that is the course over ground.  ``course`` then tells the
+heading of the paper: the matrix is handed out turned by the crab angle.  So Eqn 4 compares along the true heading
+whatever is told; along the course a crab of 23 degrees becomes a tilt in every turn.  ``magnetometer``: to magnetic
+north.
 
 Before the yaw is locked
 ------------------------
@@ -39,8 +36,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
-from estimator.gyro_frame import (
+from estimator.blocks.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.blocks.gyro_frame import (
     GYRO_FRAME,
     LONGEST_LATENCY_S,
     apply_corrections,
@@ -50,11 +47,9 @@ from estimator.gyro_frame import (
     sum_up,
     to_earth,
 )
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
-from estimator.jit import inlined, kernel
-from estimator.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
-from estimator.pi import feed_back
-from estimator.screening import (
+from estimator.blocks.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
+from estimator.blocks.pi import feed_back
+from estimator.blocks.screening import (
     FORCE_RANGE_M_S2,
     G_M_S2,
     GPS,
@@ -66,7 +61,9 @@ from estimator.screening import (
     screen,
     take_rate,
 )
-from estimator.wind import WIND_FILTER, learn_wind
+from estimator.blocks.wind import WIND_FILTER, learn_wind
+from estimator.compiler.jit import inlined, kernel
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 
 FIX_LIFE_S = 2.5  # reports further apart are compared no more
 LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown

@@ -188,7 +188,7 @@ class AttitudeEstimator(Protocol):
     Optional: ``heading_reference``, "course" (default) or "nose", what the heading converges to;
     ``reset(on_ground)``, called at power-up with the mean inertial sample of the calibration window, or
     with None where the flight starts in the air; ``uses``, names of the instruments that it can make something
-    of; and ``replay(rows)``, a whole log in one call, see `estimator.compiled`.
+    of; and ``replay(rows)``, a whole log in one call, see `estimator.blocks.compiled`.
     """
 
     def update(self, m: Measurements) -> AttitudeEstimate:

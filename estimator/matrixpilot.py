@@ -54,16 +54,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
-from estimator.interface import Column, HeadingReference, ImuSample, dtype_of
-from estimator.jit import kernel
-from estimator.kernels import clip, wrap
-from estimator.matrixpilot_params import CLASSIC as CLASSIC
-from estimator.matrixpilot_params import UDB4 as UDB4
-from estimator.matrixpilot_params import UDB5 as UDB5
-from estimator.matrixpilot_params import MatrixPilotParams
-from estimator.rotation import NEAR, level, propagate, renormalise
-from estimator.screening import (
+from estimator.blocks.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
+from estimator.blocks.kernels import clip, wrap
+from estimator.blocks.screening import (
     FORCE_GOOD,
     G_M_S2,
     GPS,
@@ -74,6 +67,13 @@ from estimator.screening import (
     screen,
     take_rate,
 )
+from estimator.compiler.jit import kernel
+from estimator.interface import Column, HeadingReference, ImuSample, dtype_of
+from estimator.matrixpilot_params import CLASSIC as CLASSIC
+from estimator.matrixpilot_params import UDB4 as UDB4
+from estimator.matrixpilot_params import UDB5 as UDB5
+from estimator.matrixpilot_params import MatrixPilotParams
+from estimator.rotation import NEAR, level, propagate, renormalise
 
 BOOST_RAD_S, MOST_BOOST = math.radians(50.0), 10.0  # spin beyond which the gains rise, and how far
 LEARN_BELOW_RAD_S = math.radians(20.0)  # the integral rests while spinning faster

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, fields
 
-from estimator.screening import FORCE_RANGE_M_S2, GYRO_RANGE_RAD_S
+from estimator.blocks.screening import FORCE_RANGE_M_S2, GYRO_RANGE_RAD_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,8 @@ Beyond the paper
 ----------------
 Each but the yaw lock has a parameter that turns it off.
 
-*GPS-lag filter* (`estimator.gps_lag`; the paper names it, without equations).  The nose passes the receiver's own
-filter and latency before it meets the course.  A vector filter also shrinks the speed of a turning aeroplane: it is
+*GPS-lag filter* (`estimator.blocks.gps_lag`; the paper names it, without equations).  The nose passes the receiver's
+own filter and latency before it meets the course.  A vector filter also shrinks the speed of a turning aeroplane: it is
 divided by the length of the equally filtered nose.  `rotate_history` takes the lag out of the feedback loop.
 
 *Yaw lock.*  The cross product of Eqn 23 fades beyond 90 degrees of error and vanishes at 180.  Beyond 90 its
@@ -40,7 +40,7 @@ that there is takes its place: the airspeed sensor's where one reports; with `tu
 turn about the vertical accelerates horizontally: the speed for which ``g_reference`` is at right angles to
 ``omega x V``; MatrixPilot took to such a speed in 2017); with `learn_wind` ground velocity less wind.
 
-*Wind* (off by default; the paper: "somehow compute the wind vector").  Learnt in turns, `estimator.wind`.  The
+*Wind* (off by default; the paper: "somehow compute the wind vector").  Learnt in turns, `estimator.blocks.wind`.  The
 reference of Eqn 22 is then the direction of ground velocity less wind, and the heading converges to the nose.
 
 *Saturation* (the paper: "error will be introduced into the roll-pitch orientation").  A clipped axis says no more
@@ -60,8 +60,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.compiled import BELIEF, Compiled, write_estimate, write_wind
-from estimator.gps_lag import (
+from estimator.blocks.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.blocks.gps_lag import (
     LAG,
     LONGEST_LATENCY_S,
     corrected_nose,
@@ -70,12 +70,9 @@ from estimator.gps_lag import (
     start_history,
     turn_frame,
 )
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
-from estimator.jit import inlined, kernel
-from estimator.kernels import clip
-from estimator.pi import correct, corrected_rate, learn_offset, weigh
-from estimator.rotation import integrate
-from estimator.screening import (
+from estimator.blocks.kernels import clip
+from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
+from estimator.blocks.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     G_M_S2,
@@ -88,7 +85,10 @@ from estimator.screening import (
     refuse,
     screen,
 )
-from estimator.wind import WIND_FILTER, learn_wind
+from estimator.blocks.wind import WIND_FILTER, learn_wind
+from estimator.compiler.jit import inlined, kernel
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.rotation import integrate
 
 FIX_LIFE_S = 2.0  # an older fix corrects nothing any more
 AIR_LIFE_S = 1.0  # nor does an older airspeed

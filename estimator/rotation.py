@@ -11,9 +11,9 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimator.blocks.kernels import wrap
+from estimator.compiler.jit import inlined, kernel
 from estimator.interface import Array
-from estimator.jit import inlined, kernel
-from estimator.kernels import wrap
 
 NEAR = 0.02  # within this of a unit length (squared) or of a right angle (cosine), Eqns 19 and 21 are good to 3e-4
 LONGEST_STEP_RAD = 0.2  # Eqn 17 wants steps that change little

@@ -45,10 +45,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.compiled import BELIEF, Compiled, write_estimate
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
-from estimator.jit import kernel
-from estimator.magnetometer import (
+from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
+from estimator.blocks.magnetometer import (
     FIELD,
     FIELD_RANGE_UT,
     SHORTEST_HORIZONTAL,
@@ -57,7 +55,7 @@ from estimator.magnetometer import (
     turn_to_north,
     write_calibration,
 )
-from estimator.screening import (
+from estimator.blocks.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
     G_M_S2,
@@ -68,6 +66,8 @@ from estimator.screening import (
     screen,
     take_rate,
 )
+from estimator.compiler.jit import kernel
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
 
 ZERO = (0.0, 0.0, 0.0)
 SMALL_RAD = 0.1  # "small": larger rotations are applied in parts

@@ -16,12 +16,11 @@ Passes when    it survives; the nose truly came round three times, faster than 1
 
 import math
 
+from autopilot.figures import inside_loops
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import inside_loops
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import loops_end_s, most_loops, turns_that_count
 from scenarios.harness.metrics import (
     after,
     end,
@@ -33,6 +32,7 @@ from scenarios.harness.metrics import (
     settling,
     start,
 )
+from scenarios.harness.metrics.manoeuvres import loops_end_s, most_loops, turns_that_count
 from scenarios.harness.scenario import Scenario
 
 LOOPS = 3

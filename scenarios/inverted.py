@@ -16,12 +16,11 @@ Passes when    it survives and is never below 80 m (from 120 m); it was truly up
 
 import math
 
+from autopilot.figures import inverted_circuit
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import inverted_circuit
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import course_turned, inverted, last, total_s
 from scenarios.harness.metrics import (
     after,
     at,
@@ -33,6 +32,7 @@ from scenarios.harness.metrics import (
     over,
     rms,
 )
+from scenarios.harness.metrics.manoeuvres import course_turned, inverted, last, total_s
 from scenarios.harness.scenario import Scenario
 
 FIRST_S, LEGS = 25.0, 4

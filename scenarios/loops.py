@@ -17,13 +17,20 @@ Passes when    it survives; the nose truly came round three times; from 10 to 30
 
 import math
 
+from autopilot.figures import DIVE, inside_loops, outside_loops
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import DIVE, inside_loops, outside_loops
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import inverted, last, loops_end_s, most_loops, most_outside_loops, turns_that_count
 from scenarios.harness.metrics import after, end, height_m, inclination_error_deg, lowest, over, rms, start
+from scenarios.harness.metrics.manoeuvres import (
+    inverted,
+    last,
+    loops_end_s,
+    most_loops,
+    most_outside_loops,
+    turns_that_count,
+)
 from scenarios.harness.scenario import Scenario
 
 LOOPS = 3

@@ -17,13 +17,13 @@ Passes when    it survives and is never below 80 m (from 120 m); the figures wer
 
 import math
 
+from autopilot.figures import aileron_roll, immelmann, split_s
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import aileron_roll, immelmann, split_s
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import inverted, last, most_loops, turned, turns_that_count
 from scenarios.harness.metrics import after, at, end, height_m, inclination_error_deg, lowest, over, rms
+from scenarios.harness.metrics.manoeuvres import inverted, last, most_loops, turned, turns_that_count
 from scenarios.harness.scenario import Scenario
 
 ROLLS = 3

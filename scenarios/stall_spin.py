@@ -19,12 +19,11 @@ Passes when    it survives and is never below 100 m (from 250 m); it truly spun 
 
 import math
 
+from autopilot.figures import spin
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import spin
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import last, spinning, spun_turns
 from scenarios.harness.metrics import (
     after,
     at,
@@ -39,6 +38,7 @@ from scenarios.harness.metrics import (
     rms,
     settling,
 )
+from scenarios.harness.metrics.manoeuvres import last, spinning, spun_turns
 from scenarios.harness.scenario import Scenario
 
 FIRST_S = 25.0

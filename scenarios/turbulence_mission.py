@@ -20,7 +20,7 @@ from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
 from scenarios.harness.metrics import at, heading_error_deg, highest, inclination_error_deg, over, rms
-from scenarios.harness.routes import height_missing_m, off_route_m, waypoints_reached
+from scenarios.harness.metrics.routes import height_missing_m, off_route_m, waypoints_reached
 from scenarios.harness.scenario import Scenario
 
 SETTLED = at(60.0)

@@ -26,8 +26,8 @@ from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Script, Timed, reversals
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import roll_outs, slowest_recovery, time_banked_s, while_banked
 from scenarios.harness.metrics import at, heading_error_deg, height_m, highest, inclination_error_deg, lowest, over, rms
+from scenarios.harness.metrics.manoeuvres import roll_outs, slowest_recovery, time_banked_s, while_banked
 from scenarios.harness.scenario import Scenario
 
 TURNS = 3

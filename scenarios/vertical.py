@@ -17,12 +17,11 @@ Passes when    it survives and is never below 80 m (from 120 m); it truly pointe
 
 import math
 
+from autopilot.figures import stall_turn, vertical_climb
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import stall_turn, vertical_climb
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
-from scenarios.harness.manoeuvres import last, longest_s, total_s, turned, vertical
 from scenarios.harness.metrics import (
     after,
     at,
@@ -34,6 +33,7 @@ from scenarios.harness.metrics import (
     over,
     rms,
 )
+from scenarios.harness.metrics.manoeuvres import last, longest_s, total_s, turned, vertical
 from scenarios.harness.scenario import Scenario
 
 FIRST_S = 25.0

@@ -13,14 +13,14 @@ from typing import Any
 from autopilot.interface import NEUTRAL, Autopilot
 from autopilot.pilot import Script
 from estimator.interface import AttitudeEstimator, HeadingReference, ImuSample
-from sim.acceptance import FlightCodeFailed, blaming, command_of, estimate_of, record_command, reference_of
 from sim.events import events_of
+from sim.flight_code import FlightCodeFailed, blaming, command_of, estimate_of, record_command, reference_of
 from sim.log import Flight, Log, Outcome
 from sim.oracle import Oracle
+from sim.outside.signals import Interrupted, TimedOut, check, listening
 from sim.plant import Plant, SimulationDiverged
 from sim.power_up import mean_sample
 from sim.sensors.suite import Suite
-from sim.signals import Interrupted, TimedOut, check, listening
 
 Watch = Callable[[Log, int], None]  # shown the log and the number of its rows that are filled
 

@@ -7,7 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from sim.wording import brief
+from sim.outside.wording import brief
 
 T = TypeVar("T")
 _MOST_TOLD = 60  # names in one message; of more, those that begin alike are told as one

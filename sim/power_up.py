@@ -12,10 +12,10 @@ from autopilot.interface import NEUTRAL
 from estimator.interface import Array, ImuSample
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import Motion, PrescribedPlant, Rest
+from sim.motion.prescribed_plant import Motion, PrescribedPlant, Rest
+from sim.motion.turn_table import TurnTable
 from sim.sensors.fitting import SuiteParams
 from sim.sensors.suite import Suite
-from sim.turn_table import TurnTable
 
 
 def sample_at_rest(params: SuiteParams, rates: Rates, seed: int, flight: int = 0) -> ImuSample | None:

@@ -28,8 +28,9 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from estimator.interface import Column
-from sim import drafts, files, recording_checks
+from sim import recording_checks
 from sim.log import TABLES, Event, Flight, Log, Outcome
+from sim.outside import drafts, files
 
 PARQUET = "flight.parquet"
 MANIFEST = "manifest.json"

@@ -16,7 +16,7 @@ from autopilot.interface import Mode
 from estimator.instruments import PROPERTIES, property_value
 from estimator.interface import Health
 from sim.log import Outcome, Phase
-from sim.wording import printable
+from sim.outside.wording import printable
 
 LONGEST_TICK_S, LATEST_S = 10.0, 1e11  # of a tick; a time beyond is none, with 15 digits not even to the tick
 MOST_BYTES = 4 << 30  # of all columns in memory

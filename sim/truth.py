@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 from sim.log import Log
 
 EARTH_RATE_RAD_S = 7.292115e-5  # WGS 84

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from sim.viewer import await_port, executable, free_port
+from sim.view.viewer import await_port, executable, free_port
 
 recording, seconds, picture = Path(sys.argv[1]).resolve(), float(sys.argv[2]), Path(sys.argv[3])
 port = free_port()

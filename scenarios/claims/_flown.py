@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from estimator.blocks.kernels import wrap
 from estimator.interface import Array
-from estimator.kernels import wrap
 from estimator.rotation import heading_rad
-from scenarios.harness.manoeuvres import RollOut, roll_outs
 from scenarios.harness.metrics import SeriesOf, bank_size_deg, end, rms
+from scenarios.harness.metrics.manoeuvres import RollOut, roll_outs
 from sim.log import Flight
 
 TURNING_DEG = 20.0  # bank beyond which an aeroplane is said to turn

@@ -20,7 +20,7 @@ from estimator.rotation import inclination_error_rad, rotation_error_rad
 from scenarios.harness.fitted import suite_params
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import Motion, PrescribedPlant
+from sim.motion.prescribed_plant import Motion, PrescribedPlant
 from sim.sensors.suite import Suite
 
 IMU_HZ = 50

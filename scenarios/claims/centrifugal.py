@@ -6,13 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from estimator.compiled import write_estimate
-from estimator.jit import kernel
+from estimator.blocks.compiled import write_estimate
+from estimator.compiler.jit import kernel
 from estimator.premerlani import Premerlani, step
 from scenarios.claims._flown import pooled_rms, tuned
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import bank_size_deg, inclination_error_deg, time_s
 from sim.log import Outcome
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from estimator.blocks.kernels import wrap
 from estimator.interface import Array
-from estimator.kernels import wrap
 from estimator.rotation import heading_rad
 from scenarios.claims._flown import (
     course_error_deg,
@@ -18,9 +18,9 @@ from scenarios.claims._flown import (
     slowest,
     tuned,
 )
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import (
     heading_error_deg,
     inclination_error_deg,

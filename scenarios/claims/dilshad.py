@@ -14,8 +14,8 @@ from estimator.baselines import GyroOnly
 from estimator.dilshad import Dilshad, DilshadParams, paper_angles
 from estimator.interface import Array
 from estimator.rotation import heading_error_rad
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_motions import (
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.motions import (
     DECLINATION_RAD,
     FIELD_E_UT,
     RATES,
@@ -24,11 +24,11 @@ from scenarios.harness.claim_motions import (
     seen,
     tilt_deg,
 )
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import rms
-from sim.hover import Hover
 from sim.log import Log
-from sim.prescribed_plant import Rest
+from sim.motion.hover import Hover
+from sim.motion.prescribed_plant import Rest
 
 BOARD = "dilshad_9dof"
 TEN_MINUTES_S = 600.0

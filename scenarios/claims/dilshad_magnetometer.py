@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from estimator.blocks.magnetometer import Calibration, hard_iron_from_extremes
 from estimator.dilshad import heading_of_field
 from estimator.interface import Array
-from estimator.magnetometer import Calibration, hard_iron_from_extremes
 from estimator.rotation import heading_rad
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_motions import DECLINATION_RAD, FIELD_E_UT, seen
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.motions import DECLINATION_RAD, FIELD_E_UT, seen
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import highest, rms
-from sim.hover import Hover
-from sim.prescribed_plant import rotation_from_euler
-from sim.turn_table import TurnTable
+from sim.motion.hover import Hover
+from sim.motion.prescribed_plant import rotation_from_euler
+from sim.motion.turn_table import TurnTable
 
 BOARD = "dilshad_9dof"
 MAGNET_UT = (10.0, -6.0, 15.0)

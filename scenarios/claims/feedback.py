@@ -22,12 +22,12 @@ from scenarios.claims._open_loop import (
     printed,
     sensed,
 )
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, VIOLET, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, VIOLET, axes, label
 from scenarios.harness.metrics import Series, inclination_error_deg, rms, settled_after_s
 from sim.log import Phase
-from sim.prescribed_plant import Kinematics, SteadyTurn, StraightLevel, rotation_from_euler
+from sim.motion.prescribed_plant import Kinematics, SteadyTurn, StraightLevel, rotation_from_euler
 
 TILT_DEG, WATCHED_S = 9.0, 20.0
 

@@ -21,12 +21,12 @@ from scenarios.claims._open_loop import (
     sensed,
 )
 from scenarios.harness.checks import Row
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import inclination_error_deg, rms
+from sim.motion.prescribed_plant import HandHeld, Motion, Rest, SteadyTurn, StraightLevel
 from sim.power_up import mean_sample
-from sim.prescribed_plant import HandHeld, Motion, Rest, SteadyTurn, StraightLevel
 
 FEW_DEG = 5.0  # "a few degrees"
 MINUTE_S = 60.0

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from estimator.interface import Array
 from estimator.rotation import integrate, propagate, rotation_error_rad
 from scenarios.claims._open_loop import STEP_S
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, axes, label
 from scenarios.harness.metrics import inclination_error_deg, rms
-from sim.prescribed_plant import SteadyTurn
+from sim.motion.prescribed_plant import SteadyTurn
 
 RATE_DEG_S = 60.0  # the paper's example
 

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from estimator.interface import Array
 from scenarios.claims._flown import PUBLISHED, TURNING_DEG, course_error_deg, pooled_rms, rms_in_turns, tuned
 from scenarios.claims._open_loop import sensed
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import bank_size_deg, heading_error_deg, inclination_error_deg, time_s
 from sim.log import Phase
-from sim.prescribed_plant import CALM, Kinematics, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics, rotation_from_euler
 
 COURSE = heading_error_deg("course")
 SETTLED_S = 20.0

@@ -7,13 +7,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from estimator.blocks.screening import G_M_S2
 from estimator.interface import Array
 from estimator.rotation import inclination_error_rad
-from estimator.screening import G_M_S2
 from scenarios.claims._flown import PUBLISHED, pooled_rms, slowest, tuned
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import heading_error_deg, height_m, inclination_error_deg, settled_after_s, time_s
 from sim.log import Flight, Outcome
 

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from estimator.interface import Array
 from estimator.rotation import integrate, propagate, renormalise, rotation_error_rad
 from scenarios.claims._open_loop import STEP_S
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import rms
 
 RATE_DEG_S = 60.0  # the paper's example

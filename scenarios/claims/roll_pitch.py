@@ -12,19 +12,19 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from estimator.ap_dcm import ApDcm
-from estimator.ap_dcm_params import ApDcmParams
-from estimator.compiled import Compiled
+from estimator.ap_dcm.params import ApDcmParams
+from estimator.blocks.compiled import Compiled
 from estimator.gps_velocity import GpsVelocity, GpsVelocityMagnetometer, GpsVelocityParams
 from estimator.interface import Array, AttitudeEstimate, Measurements
 from estimator.premerlani import Premerlani, PremerlaniParams
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_motions import DECLINATION_RAD, felt_at_rest, seen, tilt_deg
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.motions import DECLINATION_RAD, felt_at_rest, seen, tilt_deg
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import highest, inclination_error_deg, rms, survived, time_s
-from sim.hover import Hover
 from sim.log import Log
-from sim.prescribed_plant import Loop, Motion, SteadyTurn
+from sim.motion.hover import Hover
+from sim.motion.prescribed_plant import Loop, Motion, SteadyTurn
 
 WEIGHT = 0.5  # of the roll-pitch correction, 1/s, for every estimator here
 FILTER_S, LATENCY_S = 1.0, 0.3

@@ -11,16 +11,16 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.blocks.screening import G_M_S2
 from estimator.interface import Array
 from estimator.rotation import heading_error_rad, integrate
-from estimator.screening import G_M_S2
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_motions import seen, tilt_deg
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.motions import seen, tilt_deg
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import rms
 from sim.log import Log
-from sim.prescribed_plant import Motion, Rest, SteadyTurn, StraightLevel
+from sim.motion.prescribed_plant import Motion, Rest, SteadyTurn, StraightLevel
 
 GAIN_1_S = 0.5  # proportional gain per radian of error; the note gives none
 TILTED_DEG, TURNED_DEG, BANK_DEG = 10.0, 30.0, 35.0

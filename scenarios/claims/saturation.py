@@ -18,13 +18,13 @@ from scenarios.claims._open_loop import (
     printed,
     sensed,
 )
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
-from scenarios.harness.manoeuvres import loops_end_s
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import inclination_error_deg, settled_after_s
+from scenarios.harness.metrics.manoeuvres import loops_end_s
 from sim.log import Flight
-from sim.prescribed_plant import SteadyTurn
+from sim.motion.prescribed_plant import SteadyTurn
 
 RANGE_DEG_S, PEAK_DEG_S, PULSE_S = 100.0, 160.0, 2.0
 

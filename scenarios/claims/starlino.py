@@ -8,13 +8,13 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from estimator.baselines import GyroOnly
-from estimator.compiled import Compiled
+from estimator.blocks.compiled import Compiled
 from estimator.interface import Array
 from estimator.rotation import heading_error_rad
 from estimator.starlino import NED_FROM_NWU, Starlino, StarlinoParams
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_motions import (
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.motions import (
     DECLINATION_RAD,
     RATES,
     calibration,
@@ -23,9 +23,9 @@ from scenarios.harness.claim_motions import (
     seen,
     tilt_deg,
 )
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import highest, rms
-from sim.prescribed_plant import FreeFall, HandHeld, Motion, Rest, SteadyTurn, StraightLevel
+from sim.motion.prescribed_plant import FreeFall, HandHeld, Motion, Rest, SteadyTurn, StraightLevel
 
 S_G, S_A = 20.0, 1.0  # comment 49
 BOARD = "dilshad_9dof"

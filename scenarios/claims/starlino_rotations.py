@@ -13,15 +13,15 @@ from scipy.spatial.transform import Rotation
 from estimator.interface import Array
 from estimator.rotation import heading_rad
 from estimator.starlino import NED_FROM_NWU, Starlino, StarlinoParams, orthonormalise
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_motions import (
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.motions import (
     RATES,
     seen,
 )
-from scenarios.harness.claim_picture import BLUE, FAINT, RED, axes, label
+from scenarios.harness.claims.picture import BLUE, FAINT, RED, axes, label
 from scenarios.harness.metrics import rms
-from sim.hover import Hover
 from sim.log import Log
+from sim.motion.hover import Hover
 
 WEIGHT_G, WEIGHT_A = 20.0, 1.0  # comment 49
 STILL = ((0.0, 1.0, 0.0),)

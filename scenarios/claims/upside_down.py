@@ -9,19 +9,19 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from autopilot.guidance import heading_error
+from estimator.blocks.kernels import wrap
 from estimator.interface import Array
-from estimator.kernels import wrap
 from estimator.premerlani import Premerlani
 from scenarios.claims._flown import course_rad
 from scenarios.claims._open_loop import aboard, begin, inclination_deg, sensed
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, axes, label
-from scenarios.harness.manoeuvres import inverted
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, axes, label
 from scenarios.harness.metrics import survived, time_s
+from scenarios.harness.metrics.manoeuvres import inverted
 from scenarios.inverted import FIRST_S, LEGS
 from sim.log import Flight, Log, Phase
-from sim.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, SteadyTurn, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, SteadyTurn, rotation_from_euler
 
 FLOWN_S, SETTLED_S = 120.0, 20.0
 BANK_RAD = math.radians(20.0)

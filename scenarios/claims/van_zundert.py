@@ -11,19 +11,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from estimator.ap_dcm import ApDcm, renormalise_exactly, spin_gain
-from estimator.ap_dcm_params import JULY_2013, ApDcmParams, Quirk
+from estimator.ap_dcm import ApDcm, spin_gain
+from estimator.ap_dcm.params import JULY_2013, ApDcmParams, Quirk
+from estimator.blocks.kernels import wrap
 from estimator.interface import Array, Measurements
-from estimator.kernels import wrap
-from estimator.rotation import propagate, renormalise, to_euler
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_flights import flights
-from scenarios.harness.claim_motions import DECLINATION_RAD, felt_at_rest, seen, tilt_deg
-from scenarios.harness.claim_picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from estimator.rotation import propagate, renormalise, renormalise_exactly, to_euler
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.motions import DECLINATION_RAD, felt_at_rest, seen, tilt_deg
+from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import highest, rms
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import HandHeld, Motion, Rest
+from sim.motion.prescribed_plant import HandHeld, Motion, Rest
 
 OFFSET_DEG_S = (0.8, -0.6, 0.5)  # of the gyros of the bench
 BY_HAND = HandHeld(math.radians(50.0), ((0.035, 0.08), (0.05, 0.09), (0.03, 0.07)))  # up to 90 degrees of tilt

@@ -12,11 +12,11 @@ from estimator.interface import Array
 from estimator.premerlani import Premerlani
 from scenarios.claims._flown import slowest
 from scenarios.claims._open_loop import attitude_deg, begin, misread, printed, sensed
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claim_picture import BLUE, FAINT, ORANGE, RED, axes, label
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
+from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import Series, settled_after_s
 from sim.log import Phase
-from sim.prescribed_plant import CALM, Kinematics, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics, rotation_from_euler
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,8 @@ import math
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
+from estimator.blocks.magnetometer import Calibration
 from estimator.instruments import Instruments, Known
-from estimator.magnetometer import Calibration
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import (

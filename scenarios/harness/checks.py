@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 
 from scenarios.harness.metrics import Measured, Metric, survived
-from sim.blame import Refused, home_of, shown, theirs
 from sim.log import Flight
+from sim.outside.blame import Refused, home_of, shown, theirs
 
 Pooling = Literal["rms", "worst", "count"]
 Sense = Literal["<=", ">="]

@@ -10,7 +10,6 @@ import numpy as np
 from estimator.instruments import Known, to_json
 from estimator.interface import HeadingReference
 from scenarios.harness.aboard import flight_code, instruments_of, require_heard, with_calibration
-from scenarios.harness.air_config import build_air
 from scenarios.harness.config import (
     BenchStart,
     FlightConfig,
@@ -20,18 +19,19 @@ from scenarios.harness.config import (
     override,
     resolve,
 )
-from scenarios.harness.fault_config import parse_fault
+from scenarios.harness.config.air import build_air
+from scenarios.harness.config.faults import parse_fault
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import Maker, PluginError, heading_reference_of, learnt, maker_name
 from scenarios.harness.scenario import Scenario, ScriptFailed
+from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.clock import Rates
 from sim.events import events_of_faults
-from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Event, Flight, Log, Outcome
 from sim.loop import Watch, fly
+from sim.motion.prescribed_plant import PrescribedPlant, Rest
 from sim.plant import HandThrow, InFlight, Plant, Start
 from sim.power_up import sample_at_rest
-from sim.prescribed_plant import PrescribedPlant, Rest
 from sim.recording import plain
 from sim.sensors.faults import Fault
 from sim.sensors.suite import Suite

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
-from sim.blame import Refused, theirs
+from sim.outside.blame import Refused, theirs
 
 _run: dict[str, ModuleType] = {}  # modules that were made here, by name
 
@@ -89,7 +89,7 @@ def _cached_apart(name: str, *, apart: bool) -> Iterator[None]:
         return
     from numba import config
 
-    from estimator.kernel_cache import base
+    from estimator.compiler.kernel_cache import base
 
     before, config.CACHE_DIR = config.CACHE_DIR, str(base() / f"{name}-numba")
     try:

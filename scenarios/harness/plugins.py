@@ -29,10 +29,10 @@ from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
 from estimator.instruments import Instruments, Known, property_value
 from scenarios.harness.own_files import also_import_from, module_of_file
-from sim.blame import Refused, home_of, place_of, shown, theirs
+from sim.outside.blame import Refused, home_of, place_of, shown, theirs
+from sim.outside.wording import class_name, described, printable
 from sim.params import changed, dotted_fields
 from sim.params import near_misses as near_misses
-from sim.wording import class_name, described, printable
 
 if TYPE_CHECKING:  # names are looked up here before anything is flown: nothing heavy is imported for that
     from autopilot.interface import Autopilot
@@ -284,7 +284,7 @@ def maker_name(spec: "str | Maker") -> str:
 
 
 def _check_reference(spec: "str | Maker", estimator: object) -> None:
-    from sim.acceptance import reference_of  # here, for it loads the compiler
+    from sim.flight_code import reference_of  # here, for it loads the compiler
 
     with _refusing(_ESTIMATOR, spec, home_of(estimator)):
         reference_of(estimator)
@@ -330,7 +330,7 @@ def uses_of(estimator: object, instead: tuple[str, ...]) -> tuple[str, ...]:
 
 def heading_reference_of(estimator: object) -> "HeadingReference":
     """What the heading of `estimator` converges to; the course where it does not say, PluginError for another word."""
-    from sim.acceptance import reference_of  # here, for it loads the compiler
+    from sim.flight_code import reference_of  # here, for it loads the compiler
 
     with _refusing(_ESTIMATOR, class_name(estimator), home_of(estimator)):
         return reference_of(estimator)

@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from scenarios.harness import guard
 from scenarios.harness.aboard import flight_code, require_heard, unheard
-from scenarios.harness.catalogue import aircraft
+from scenarios.harness.commands.catalogue import aircraft
 from scenarios.harness.config import FlightConfig, override, resolve
+from scenarios.harness.gate import guard
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
-from sim.signals import TimedOut, limited
+from sim.outside.signals import TimedOut, limited
 
 _PREPARING = "what is flown"
 _LOADING = "while it was loaded, before anything was flown or written"

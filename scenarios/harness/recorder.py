@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from scenarios.harness import cli_reports, viewing
+from scenarios.harness.cli import reports as cli_reports
+from scenarios.harness.commands import view as viewing
 from sim import recording
 from sim.log import Flight
 

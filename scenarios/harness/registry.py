@@ -18,7 +18,7 @@ import scenarios
 from scenarios.harness.own_files import module_of_file
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.scenario import Scenario
-from sim.blame import Refused, shown, theirs
+from sim.outside.blame import Refused, shown, theirs
 
 
 @cache

@@ -19,23 +19,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.blocks.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
 from estimator.instruments import PROPERTIES, Instruments, Known, to_json
 from estimator.interface import Array, AttitudeEstimator, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
-from estimator.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
-from scenarios.harness import console
+from scenarios.harness.cli import console
 from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.logs.validity import INTERVALS, LONGEST_S
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
 from scenarios.harness.plugins import Equipped, PluginError, equipped, heading_reference_of, learnt
-from sim.acceptance import FlightCodeFailed, blaming, estimate_of, record_estimates
-from sim.blame import Refused, shown
 from sim.events import events_of
+from sim.flight_code import FlightCodeFailed, blaming, estimate_of, record_estimates
 from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.loop import power_up
 from sim.oracle import Oracle
-from sim.wording import printable
+from sim.outside.blame import Refused, shown
+from sim.outside.wording import printable
 
 CALIBRATION_S = 2.0
 STILL_M_S, STILL_M_S2 = 2.0, 0.7  # faster over the ground, or shaken more than this (sigma), is not at rest

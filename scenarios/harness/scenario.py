@@ -8,8 +8,8 @@ from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Script
 from scenarios.harness.checks import Check, Pooling, Sense
 from scenarios.harness.config import FlightConfig, override
-from sim.blame import Refused, home_of, shown, theirs
 from sim.log import Event, Flight
+from sim.outside.blame import Refused, home_of, shown, theirs
 
 Moments = Callable[[Flight], Iterable[float]]  # times since the release
 

@@ -10,7 +10,7 @@ from scenarios.harness.checks import Row
 from scenarios.harness.metrics import summary
 from scenarios.harness.scenario import Scenario
 from sim.log import Flight, Outcome
-from sim.wording import json_text, markdown
+from sim.outside.wording import json_text, markdown
 
 PASSED, FAILED, SIMULATION_FAILED = 0, 1, 3  # exit codes; 2 is for usage and configuration
 # Outcomes that are no result of flying: what was to be judged is not there, or only half of it.
@@ -158,7 +158,7 @@ class Verdict:
 
     def to_junit(self) -> str:
         """The verdict as JUnit XML, see `junit`."""
-        from scenarios.harness.junit import junit
+        from scenarios.harness.gate.junit import junit
 
         return junit(self)
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 from sim.air import dryden
 from sim.air.gust import Gust, add_gusts
 from sim.air.profile import share_of_wind

@@ -29,7 +29,7 @@ from typing import Final
 
 import numpy as np
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 KNOT_M_S = 1852.0 / 3600.0
 SEVERITIES_M_S: Final = {  # W20 of the words of MIL-F-8785C: 15, 30 and 45 knots

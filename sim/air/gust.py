@@ -11,7 +11,7 @@ T V / 2 of an aeroplane of airspeed V is the standard's gust length d_m.
 import math
 from dataclasses import dataclass
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 STRONGEST_M_S = 30.0
 

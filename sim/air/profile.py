@@ -8,7 +8,7 @@ woods 0.2 to 0.3.  An exponent of 0 is the same wind at every height.
 
 from typing import Final
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 REFERENCE_HEIGHT_M: Final = 10.0  # at which weather stations measure
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 MOST = 20  # thermals at once
 # Shape constants by r1 / r2: k1, k2, k3, k4 (appendix B).

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams, warming

@@ -23,7 +23,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 from sim import place
 from sim.clock import Rates
 from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Source, gauss_markov, require, require_scale

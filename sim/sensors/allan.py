@@ -17,8 +17,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 
 FLICKER: Final = 2.0 * math.log(2.0) / math.pi  # Allan variance of flicker noise with B = 1
 SHORTEST_RECORD: Final = 4  # in longest averages

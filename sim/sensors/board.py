@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 from sim.clock import Rates
 from sim.sensors.noise import Output, Source, require
 

@@ -20,8 +20,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, get_type_hints
 
-from sim.files import check, reading, toml
-from sim.files import text as text_of
+from sim.outside.files import check, reading, toml
+from sim.outside.files import text as text_of
 from sim.params import near_misses, shown, typed, unit_of
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.air_data import AirspeedParams, BarometerParams

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.sensors.board import BoardParams

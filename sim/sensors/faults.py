@@ -30,8 +30,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 from sim import params
 from sim.clock import Rates
 from sim.sensors.air_data import height_at_m

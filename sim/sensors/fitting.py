@@ -25,7 +25,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
-from sim.files import reading
+from sim.outside.files import reading
 from sim.params import changed, near_misses
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.air_data import AirspeedParams, BarometerParams

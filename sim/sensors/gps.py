@@ -15,8 +15,8 @@ from typing import Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 from sim.clock import Rates
 from sim.place import metres_per_degree
 from sim.sensors.noise import Source, gauss_markov, require

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 from estimator.rotation import from_euler
 from sim import place
 from sim.clock import Rates

@@ -19,8 +19,8 @@ from typing import Any, Final, Literal, get_args
 
 import numpy as np
 
+from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from estimator.jit import kernel
 
 STANDARD_GRAVITY_M_S2: Final = 9.80665  # what a data sheet means by 1 g
 MOST_BITS: Final = 24

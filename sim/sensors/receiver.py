@@ -27,7 +27,7 @@ In an outage no fix is made; those already under way arrive.  The filter is sett
 
 import numpy as np
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 MEMORY = np.dtype(
     [

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.compiler.jit import kernel
 from estimator.interface import MEASURED_DTYPE, Measurements
-from estimator.jit import kernel
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log
 from sim.rng import stream

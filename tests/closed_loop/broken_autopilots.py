@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from autopilot.airframes import params_of
-from autopilot.autopilot import DcmAutopilot
+from autopilot.dcm import DcmAutopilot
 from autopilot.interface import ActuatorCommand, Setpoint
 from estimator.interface import HeadingReference
 

@@ -9,8 +9,9 @@ from scenarios.harness.config import FlightConfig, override
 from scenarios.harness.flight import fly_config, fly_scenario
 from scenarios.harness.metrics import heading_error_deg, inclination_error_deg, summary
 from scenarios.harness.registry import find
-from sim import recording, rerun_view
+from sim import recording
 from sim.log import Outcome, Phase
+from sim.view import rerun_view
 
 ASKEW = {"start.roll_deg": 10, "start.pitch_deg": -5, "start.heading_deg": 200, "duration_s": 4}
 

@@ -12,10 +12,10 @@ from scenarios.claims.centrifugal import Uncompensated
 from scenarios.claims.latency import Kink
 from scenarios.claims.upside_down import BANK_RAD, OnItsBack
 from scenarios.claims.vertical_flight import UpAndOn
-from scenarios.harness.claim import Verdict
-from scenarios.harness.claim_flights import flights
+from scenarios.harness.claims.claim import Verdict
+from scenarios.harness.claims.flights import flights
+from sim.motion.prescribed_plant import SteadyTurn, inertial_rate_and_force
 from sim.place import LATITUDE_DEG
-from sim.prescribed_plant import SteadyTurn, inertial_rate_and_force
 
 MODULES = (launch, centrifugal, course, latency, upside_down, vertical_flight)
 CLAIMS = {claim.name: claim for module in MODULES for claim in module.CLAIMS}

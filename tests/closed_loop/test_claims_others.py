@@ -14,9 +14,9 @@ from scenarios.claims import (
     starlino_rotations,
     van_zundert,
 )
-from scenarios.harness.claim_motions import DECLINATION_RAD, FIELD_E_UT, seen, tilt_deg
+from scenarios.harness.claims.motions import DECLINATION_RAD, FIELD_E_UT, seen, tilt_deg
 from scenarios.harness.metrics import rms
-from sim.prescribed_plant import Rest, SteadyTurn
+from sim.motion.prescribed_plant import Rest, SteadyTurn
 
 G = 9.8
 CHEAP = {

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from autopilot.autopilot import DcmAutopilot
+from autopilot.dcm import DcmAutopilot
 from autopilot.failsafe import FailsafeParams
 from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Script
 from estimator.interface import Health
 from estimator.premerlani import Premerlani, PremerlaniParams
+from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.air import Air
 from sim.clock import Rates
-from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Flight, Log, Outcome
 from sim.loop import fly
 from sim.plant import InFlight
@@ -108,7 +108,7 @@ class FallsIll(Premerlani):
 def without_level(monkeypatch):
     """An autopilot that believes its estimator whatever that says."""
     never = replace(DcmAutopilot().params, failsafe=FailsafeParams(unhealthy_s=1e9))
-    monkeypatch.setattr("autopilot.autopilot.params_of", lambda _aircraft: never)
+    monkeypatch.setattr("autopilot.dcm.params_of", lambda _aircraft: never)
 
 
 @pytest.mark.parametrize("mode", [Mode.COURSE, Mode.STABILISE])

@@ -14,7 +14,7 @@ from scenarios.harness.flight import fly_scenario
 from scenarios.harness.registry import find
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMAND = [sys.executable, "-c", "from scenarios.harness.guard import main; main()"]
+COMMAND = [sys.executable, "-c", "from scenarios.harness.gate.guard import main; main()"]
 OWN = """
 import os, signal, sys, threading, time
 import numpy as np

@@ -16,13 +16,14 @@ from pathlib import Path
 
 import pytest
 
-from estimator import kernel_cache
-from scenarios.harness.cli import run
-from sim import recording, rerun_view
+from estimator.compiler import kernel_cache
+from scenarios.harness.cli.app import run
+from sim import recording
+from sim.view import rerun_view
 
 ROOT = Path(recording.__file__).parents[1]
 FLY = ["fly", "hand_launch", "--duration", "2", "--out", "flights"]
-MAIN = "from scenarios.harness.guard import main; main()"
+MAIN = "from scenarios.harness.gate.guard import main; main()"
 
 
 def start(*arguments):

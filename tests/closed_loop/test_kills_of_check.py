@@ -15,7 +15,7 @@ from scenarios.harness.flight import fly_scenario
 from scenarios.harness.registry import find
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMAND = [sys.executable, "-c", "from scenarios.harness.guard import main; main()"]
+COMMAND = [sys.executable, "-c", "from scenarios.harness.gate.guard import main; main()"]
 CHECK = ["check", "crosswind", "--seeds", "0-5", "--set", "duration_s=2", "--estimator", "gyro_only", "--workers", "2"]
 REPORTS = ["--json", "v.json", "--junit", "v.xml", "--markdown", "v.md", "--ledger", "kept"]
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from scenarios.harness import agreement
+from scenarios.harness.commands import agree as agreement
 from scenarios.harness.config import BenchStart, resolve
 from scenarios.harness.flight import fly_config
 from scenarios.harness.registry import find, registered

@@ -11,8 +11,8 @@ from estimator.interface import AttitudeEstimate
 from sim.clock import Rates
 from sim.log import Log, Outcome
 from sim.loop import fly
+from sim.motion.prescribed_plant import PrescribedPlant, StraightLevel
 from sim.plant import SimulationDiverged
-from sim.prescribed_plant import PrescribedPlant, StraightLevel
 from sim.sensors.suite import SUITES, Suite
 
 SCRIPT = Script([Timed(0.0, Setpoint(Mode.STABILISE))])

@@ -14,12 +14,13 @@ from scipy.spatial.transform import Rotation
 
 from scenarios.hand_launch import SCENARIO
 from scenarios.harness.flight import fly_scenario
-from sim import recording, rerun_view, viewer
+from sim import recording
 from sim.log import Event, Flight, Log, Outcome
-from sim.mesh import aeroplane, geometry_of
-from sim.plots import curves, limits
 from sim.recording import RecordingError
-from sim.story import story
+from sim.view import rerun_view, viewer
+from sim.view.mesh import aeroplane, geometry_of
+from sim.view.plots import curves, limits
+from sim.view.story import story
 
 RERUN = (str(viewer.executable()),)
 FLOAT32 = 1e-6  # Rerun's transforms are single precision: 6e-8 of a component near 1, 1e-6 m below 16 m

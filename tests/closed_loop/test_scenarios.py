@@ -8,7 +8,7 @@ import pytest
 from estimator.interface import AttitudeEstimate
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config, fly_scenario
-from scenarios.harness.manoeuvres import roll_outs
+from scenarios.harness.metrics.manoeuvres import roll_outs
 from scenarios.harness.registry import find, registered
 from scenarios.harness.verdict import Verdict, judge
 from sim.log import Flight, Outcome, Phase

@@ -19,7 +19,7 @@ from estimator.interface import MEASURED, AttitudeEstimate, ImuSample, Measureme
 from estimator.rotation import heading_error_rad, inclination_error_rad
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import PrescribedPlant, SteadyTurn
+from sim.motion.prescribed_plant import PrescribedPlant, SteadyTurn
 from sim.sensors.air_data import AirspeedParams, BarometerParams
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.suite import SUITES, Suite

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from autopilot.interface import NEUTRAL
-from scenarios.harness.fault_config import parse_fault
+from scenarios.harness.config.faults import parse_fault
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.registry import find
 from sim.clock import Rates
 from sim.log import Log, Outcome
-from sim.prescribed_plant import PrescribedPlant, SteadyTurn
+from sim.motion.prescribed_plant import PrescribedPlant, SteadyTurn
 from sim.sensors.air_data import AirspeedParams, BarometerParams
 from sim.sensors.faults import CHANNELS, kinds_of, require_possible
 from sim.sensors.magnetometer import MagnetometerParams

@@ -7,11 +7,11 @@ from importlib import import_module
 import pytest
 
 from autopilot.airframes import AutopilotParams
-from autopilot.autopilot import DcmAutopilot
+from autopilot.dcm import DcmAutopilot
 from estimator import ESTIMATORS
 from estimator.instruments import BOOLEAN, PROPERTIES, Instruments, Known
-from scenarios.harness import compare
 from scenarios.harness.aboard import instruments_of
+from scenarios.harness.commands import compare
 from scenarios.harness.config import override, resolve
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.plugins import equipped, equipped_autopilot, shared_settings

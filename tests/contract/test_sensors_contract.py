@@ -8,7 +8,7 @@ import pytest
 from autopilot.interface import NEUTRAL
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import PrescribedPlant, SteadyTurn
+from sim.motion.prescribed_plant import PrescribedPlant, SteadyTurn
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.board import BoardParams
 from sim.sensors.gyro import GyroParams

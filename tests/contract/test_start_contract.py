@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import estimator as package
+from estimator.blocks.magnetometer import Calibration
 from estimator.interface import MEASURED_DTYPE, ImuSample, Measurements
-from estimator.magnetometer import Calibration
-from estimator.peers import Imufusion
+from estimator.peers.peers import Imufusion
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
 
 G, DT, N = 9.80665, 0.02, 60

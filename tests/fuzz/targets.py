@@ -15,13 +15,15 @@ import pyarrow.parquet as pq
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
-from scenarios.harness import exporting, logs
+from scenarios.harness import logs
+from scenarios.harness.commands import export as exporting
 from scenarios.harness.logs import column_map
-from sim import gps_messages, recording, rerun_view
+from sim import gps_messages, recording
 from sim.gps_messages import Fixes
 from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.sensors.datasheet import load_part
 from sim.sensors.fitting import load_suite, own_files
+from sim.view import rerun_view
 
 damage = sys.modules["_fuzz_mutations"]
 dataflash = sys.modules["_fuzz_test_log_dataflash"]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 
 NAMES = (
     "csv",

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
+from sim.aeroplane.jsbsim_model import Model
+from sim.aeroplane.jsbsim_plant import AIR_RATES, JsbsimPlant
 from sim.air import Air, Gust, MovingAir, Thermals
-from sim.jsbsim_model import Model
-from sim.jsbsim_plant import AIR_RATES, JsbsimPlant
 from sim.log import Log, Phase
 from sim.plant import HandThrow, InFlight
 

@@ -13,13 +13,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sim.aircraft import builder
+from sim.aeroplane.jsbsim_model import AIRCRAFT
+from sim.aircraft.design import builder
+from sim.aircraft.design.lattice import Attached, flap_effectiveness
+from sim.aircraft.design.masses import Box, Spread, balance
+from sim.aircraft.design.shape import Shape
+from sim.aircraft.design.stall import Polars, plate_normal
 from sim.aircraft.endurance import build
-from sim.aircraft.lattice import Attached, flap_effectiveness
-from sim.aircraft.masses import Box, Spread, balance
-from sim.aircraft.shape import Shape
-from sim.aircraft.stall import Polars, plate_normal
-from sim.jsbsim_model import AIRCRAFT
 
 NAMES = ("endurance", "gentle_lady")
 NUMBER = re.compile(r"-?\d+\.\d+(?:e-?\d+)?|-?\d+")

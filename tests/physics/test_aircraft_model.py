@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from sim.aircraft.shape import Shape
-from sim.jsbsim_model import AIRCRAFT
+from sim.aeroplane.jsbsim_model import AIRCRAFT
+from sim.aircraft.design.shape import Shape
 
 NAMES = ("endurance", "gentle_lady")
 

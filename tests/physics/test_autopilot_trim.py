@@ -8,11 +8,11 @@ import pytest
 from scipy.optimize import least_squares
 
 from autopilot.airframes import params_of
-from autopilot.autopilot import _PARAMS, _STATE
+from autopilot.dcm import _PARAMS, _STATE
 from autopilot.energy import level_flight
-from sim.jsbsim_model import Model
-from sim.performance import measure
-from sim.trim import Trim, accelerations, trim
+from sim.aeroplane.jsbsim_model import Model
+from sim.aeroplane.performance import measure
+from sim.aeroplane.trim import Trim, accelerations, trim
 
 
 @pytest.fixture(scope="module")

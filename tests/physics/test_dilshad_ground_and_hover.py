@@ -29,19 +29,19 @@ import numpy as np
 import pytest
 
 from autopilot.interface import NEUTRAL
+from estimator.blocks.kernels import wrap
+from estimator.blocks.magnetometer import Calibration
 from estimator.dilshad import Dilshad, DilshadParams, heading_of_field, paper_angles
 from estimator.interface import ImuSample
-from estimator.kernels import wrap
-from estimator.magnetometer import Calibration
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
 from sim import place
 from sim.clock import Rates
-from sim.hover import Hover
 from sim.log import Log
 from sim.magnetic_field import field_e_ut
-from sim.prescribed_plant import PrescribedPlant, Rest, SteadyTurn, inertial_rate_and_force
+from sim.motion.hover import Hover
+from sim.motion.prescribed_plant import PrescribedPlant, Rest, SteadyTurn, inertial_rate_and_force
+from sim.motion.turn_table import TurnTable
 from sim.sensors.suite import SUITES, Suite
-from sim.turn_table import TurnTable
 
 FIELD = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, place.YEAR)
 DECLINATION = math.atan2(FIELD[1], FIELD[0])

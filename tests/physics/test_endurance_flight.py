@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
-from sim.jsbsim_plant import JsbsimPlant
+from sim.aeroplane.jsbsim_plant import JsbsimPlant
+from sim.aeroplane.trim import Trim, accelerations, trim
 from sim.log import Log
 from sim.plant import InFlight
-from sim.trim import Trim, accelerations, trim
 
 HEIGHT_M = 200.0
 

@@ -15,8 +15,8 @@ from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
 from autopilot.interface import ActuatorCommand
+from sim.aeroplane.jsbsim_model import FT_TO_M, Model
 from sim.air import STILL
-from sim.jsbsim_model import FT_TO_M, Model
 from sim.place import LATITUDE_DEG
 from sim.truth import gravity_m_s2
 

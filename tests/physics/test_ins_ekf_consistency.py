@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from estimator.ins_ekf import InsEkf, InsEkfParams
 from sim.clock import Rates
 from sim.log import Log, Phase
+from sim.motion.prescribed_plant import GRAVITY_M_S2, Kinematics, motion_rows, rotation_from_euler
 from sim.place import LATITUDE_DEG
-from sim.prescribed_plant import GRAVITY_M_S2, Kinematics, motion_rows, rotation_from_euler
 from sim.sensors.noise import STANDARD_GRAVITY_M_S2
 from sim.sensors.suite import SUITES, Suite
 

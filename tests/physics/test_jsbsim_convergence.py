@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from autopilot.interface import ActuatorCommand
+from sim.aeroplane.jsbsim_model import Model
+from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.air import STILL
 from sim.clock import Rates
-from sim.jsbsim_model import Model
-from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Log
 from sim.plant import InFlight
 

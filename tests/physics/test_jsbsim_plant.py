@@ -8,10 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
+from sim.aeroplane.jsbsim_model import Model
+from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.air import Air
 from sim.clock import Rates
-from sim.jsbsim_model import Model
-from sim.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.log import Log, Outcome, Phase
 from sim.place import LATITUDE_DEG
 from sim.plant import HandThrow, InFlight, SimulationDiverged

@@ -8,11 +8,11 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import curve_fit
 
-from sim.derivatives import Airframe, coefficients, lanchester, textbook
-from sim.jsbsim_model import AIRCRAFT, Model
-from sim.linear import ASYMMETRIC, HEIGHT, STATES, SYMMETRIC, LinearModel, linearise, modes
-from sim.performance import measure
-from sim.trim import Trim, accelerations, trim
+from sim.aeroplane.derivatives import Airframe, coefficients, lanchester, textbook
+from sim.aeroplane.jsbsim_model import AIRCRAFT, Model
+from sim.aeroplane.linear import ASYMMETRIC, HEIGHT, STATES, SYMMETRIC, LinearModel, linearise, modes
+from sim.aeroplane.performance import measure
+from sim.aeroplane.trim import Trim, accelerations, trim
 
 NAMES = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
 HEIGHT_M, G_M_S2 = 60.0, 9.80665

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from sim.jsbsim_model import Model
-from sim.performance import STEP_RAD, measure, radius_m
+from sim.aeroplane.jsbsim_model import Model
+from sim.aeroplane.performance import STEP_RAD, measure, radius_m
 
 G_M_S2 = 9.80665
 

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from sim.clock import Rates
-from sim.place import LATITUDE_DEG
-from sim.prescribed_plant import (
+from sim.motion.prescribed_plant import (
     Coning,
     HandHeld,
     Loop,
@@ -26,6 +25,7 @@ from sim.prescribed_plant import (
     StraightLevel,
     motion_rows,
 )
+from sim.place import LATITUDE_DEG
 from sim.truth import EARTH_RATE_RAD_S, earth_rate_e_rad_s, gravity_m_s2, integrate_imu
 
 LATITUDE_RAD = math.radians(LATITUDE_DEG)

@@ -8,10 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
 from sim.clock import Rates
-from sim.hover import Hover
 from sim.log import Log
-from sim.place import LATITUDE_DEG
-from sim.prescribed_plant import (
+from sim.motion.hover import Hover
+from sim.motion.prescribed_plant import (
     GRAVITY_M_S2,
     Coning,
     FreeFall,
@@ -23,8 +22,9 @@ from sim.prescribed_plant import (
     StraightLevel,
     rotation_from_euler,
 )
+from sim.motion.turn_table import TurnTable
+from sim.place import LATITUDE_DEG
 from sim.truth import EARTH_RATE_RAD_S
-from sim.turn_table import TurnTable
 
 WIND = (3.0, -4.0, 0.5)
 MOTIONS = {

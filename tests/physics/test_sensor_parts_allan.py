@@ -12,11 +12,11 @@ import allantools
 import numpy as np
 import pytest
 
-from scenarios.harness.sensor_trial import FLIGHTS, HOUR_S, IMU_HZ, INERTIAL, SEED, figures
 from sim.clock import Rates
 from sim.rng import stream
 from sim.sensors.board import BoardParams
 from sim.sensors.datasheet import PERFECT, load_part, part_names
+from sim.sensors.trial import FLIGHTS, HOUR_S, IMU_HZ, INERTIAL, SEED, figures
 
 PARTS = {
     kind: {name: load_part(name).devices[kind] for name in part_names() if kind in load_part(name).devices}

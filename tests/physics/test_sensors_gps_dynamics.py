@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import SteadyTurn, motion_rows
+from sim.motion.prescribed_plant import SteadyTurn, motion_rows
 from sim.sensors.gps import GpsParams
 from sim.sensors.suite import SUITES, Suite, SuiteParams
 

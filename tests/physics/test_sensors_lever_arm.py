@@ -7,7 +7,7 @@ import pytest
 
 from sim.clock import Rates
 from sim.log import Log
-from sim.prescribed_plant import Coning
+from sim.motion.prescribed_plant import Coning
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.board import BoardParams
 from sim.sensors.suite import Suite, SuiteParams

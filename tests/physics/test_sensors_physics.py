@@ -8,8 +8,8 @@ import pytest
 from autopilot.interface import NEUTRAL
 from sim.clock import Rates
 from sim.log import Log
+from sim.motion.prescribed_plant import GRAVITY_M_S2, FreeFall, PrescribedPlant, Rest, SteadyTurn
 from sim.place import LATITUDE_DEG
-from sim.prescribed_plant import GRAVITY_M_S2, FreeFall, PrescribedPlant, Rest, SteadyTurn
 from sim.sensors.suite import SUITES, Suite
 from sim.truth import EARTH_RATE_RAD_S
 

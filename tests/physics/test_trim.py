@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sim.aeroplane.jsbsim_model import AIRCRAFT, Model
+from sim.aeroplane.jsbsim_plant import JsbsimPlant, rotation_of
+from sim.aeroplane.trim import Search, Trim, accelerations, earth_to_body, surfaces, trim
 from sim.air import Air
-from sim.jsbsim_model import AIRCRAFT, Model
-from sim.jsbsim_plant import JsbsimPlant, rotation_of
 from sim.log import Log
 from sim.plant import InFlight
-from sim.trim import Search, Trim, accelerations, earth_to_body, surfaces, trim
 from sim.truth import gravity_m_s2
 
 NAMES = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))

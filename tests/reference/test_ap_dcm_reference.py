@@ -14,8 +14,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.ap_dcm import JULY_2013, ApDcm, ApDcmParams, Quirk
+from estimator.blocks.kernels import wrap
 from estimator.interface import MEASURED_DTYPE, Measurements
-from estimator.kernels import wrap
 from estimator.rotation import inclination_error_rad, rotation_error_rad, to_euler
 from scenarios.harness.logs import reference
 from scenarios.harness.logs.reference import COUNT_UT

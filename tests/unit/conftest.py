@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.interface import MEASURED_DTYPE
-from scenarios.harness import console, logs, workers
+from scenarios.harness import logs
+from scenarios.harness.cli import console
+from scenarios.harness.gate import workers
 from scenarios.harness.logs.recorded import RecordedLog, Reference
 
 PLACE = 47.4, 8.5, 488.0

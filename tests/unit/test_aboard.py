@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 
+from estimator.blocks.magnetometer import Calibration
 from estimator.gps_velocity import GpsVelocityMagnetometer, GpsVelocityParams
 from estimator.interface import MEASURED_DTYPE
-from estimator.magnetometer import Calibration
 from estimator.rotation import heading_rad
 from scenarios.harness.aboard import instruments_of, with_calibration
 from scenarios.harness.config import FlightConfig, override, resolve
 from sim import place
 from sim.magnetic_field import field_e_ut
-from sim.prescribed_plant import GRAVITY_M_S2, rotation_from_euler
+from sim.motion.prescribed_plant import GRAVITY_M_S2, rotation_from_euler
 
 FIELD = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, place.YEAR)
 HARD_IRON = (6.0, -10.0, 8.0)

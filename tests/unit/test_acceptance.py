@@ -7,7 +7,7 @@ import pytest
 
 from autopilot.interface import ActuatorCommand
 from estimator.interface import AttitudeEstimate, Health, ImuSample, Measurements
-from sim.acceptance import FlightCodeFailed, Unusable, estimate_of, record_command, record_estimate
+from sim.flight_code import FlightCodeFailed, Unusable, estimate_of, record_command, record_estimate
 from sim.log import FLOWN_DTYPE, Outcome
 
 

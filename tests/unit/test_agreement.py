@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from scenarios.harness import agreement
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
+from scenarios.harness.commands import agree as agreement
 
 
 def verdict(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import integrate, linalg, signal, stats
 
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 from sim.air import Air, MovingAir
 from sim.air.dryden import FAR_M, SEVERITIES_M_S, add_turbulence, strengths, transition
 

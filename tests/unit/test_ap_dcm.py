@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.ap_dcm import JULY_2013, STATE_DTYPE, ApDcm, ApDcm2013, ApDcmParams, Quirk, spin_gain
-from estimator.ap_dcm_wind import learn_wind
+from estimator.ap_dcm.wind import learn_wind
+from estimator.compiler.jit import kernel
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
-from estimator.jit import kernel
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
 from scenarios.harness.plugins import equipped
 from scenarios.harness.replay import make

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from autopilot.airframes import params_of
-from autopilot.autopilot import DcmAutopilot
+from autopilot.dcm import DcmAutopilot
 from autopilot.interface import ActuatorCommand, Mode, Setpoint
 from autopilot.pilot import Script
+from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.air import STILL, Air
 from sim.clock import Rates
-from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Log, Outcome
 from sim.loop import fly
 from sim.oracle import Oracle

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from autopilot.autopilot import _PARAMS, _STATE
+from autopilot.dcm import _PARAMS, _STATE
 from autopilot.guidance import (
     GuidanceParams,
     agility,

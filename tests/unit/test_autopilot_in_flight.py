@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.airframes import params_of
-from autopilot.autopilot import DcmAutopilot
+from autopilot.dcm import DcmAutopilot
+from autopilot.figures import inside_loops
 from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import inside_loops
 from autopilot.pilot import Script
+from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.air import STILL, Air
 from sim.clock import Rates
-from sim.jsbsim_plant import JsbsimPlant
 from sim.log import Log, Outcome
 from sim.loop import fly
 from sim.oracle import Oracle

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.airframes import AutopilotParams
-from autopilot.autopilot import _PARAMS, _STATE, DcmAutopilot
+from autopilot.dcm import _PARAMS, _STATE, DcmAutopilot
 from autopilot.energy import hold_height, throttle_for
 from autopilot.interface import Mode, Setpoint
 from autopilot.launch import LaunchParams, climb_away, feel_throw

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import sim.aircraft
 from autopilot.airframes import AutopilotParams, params_of
-from autopilot.autopilot import _PARAMS, DcmAutopilot
+from autopilot.dcm import _PARAMS, DcmAutopilot
 from autopilot.energy import EnergyParams
 from autopilot.interface import Mode, Setpoint
 from autopilot.mixer import MixerParams, mix

@@ -4,10 +4,10 @@ import json
 import subprocess
 import sys
 
-from scenarios.harness.catalogue import aircraft, catalogue
+from scenarios.harness.commands.catalogue import aircraft, catalogue
 from scenarios.harness.plugins import AUTOPILOTS, ESTIMATORS
 from scenarios.harness.registry import registered
-from sim.jsbsim_plant import JsbsimPlant
+from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.plant import InFlight
 from sim.sensors.suite import SUITES
 
@@ -38,7 +38,7 @@ def test_aircraft_listed_load_into_jsbsim() -> None:
 def test_list_command_imports_nothing_heavy() -> None:
     """A listing is quick because no compiler, engine or file format is loaded for it."""
     code = (
-        "import json, sys; from scenarios.harness.cli import run; run(['list', '--json', '-']); "
+        "import json, sys; from scenarios.harness.cli.app import run; run(['list', '--json', '-']); "
         f"print(json.dumps([m for m in {HEAVY!r} if m in sys.modules]), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

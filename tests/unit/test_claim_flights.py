@@ -2,8 +2,8 @@
 
 import pytest
 
-from scenarios.harness import claim_flights
-from scenarios.harness.claim_flights import flights
+from scenarios.harness.claims import flights as claim_flights
+from scenarios.harness.claims.flights import flights
 from scenarios.harness.registry import find
 
 SHORT = {"duration_s": 1.0}

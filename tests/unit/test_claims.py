@@ -7,12 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.harness import claim_registry, claim_run, console
-from scenarios.harness.claim import Claim, Finding, Paper, Verdict, deciding, line
-from scenarios.harness.claim_page import page
-from scenarios.harness.claim_registry import SECTIONS, claims, matching
-from scenarios.harness.claim_run import Findings, Found, Task
-from scenarios.harness.cli import run
+from scenarios.harness.claims import registry as claim_registry
+from scenarios.harness.claims import run as claim_run
+from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, deciding, line
+from scenarios.harness.claims.page import page
+from scenarios.harness.claims.registry import SECTIONS, claims, matching
+from scenarios.harness.claims.run import Findings, Found, Task
+from scenarios.harness.cli import console
+from scenarios.harness.cli.app import run
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "claims.md"

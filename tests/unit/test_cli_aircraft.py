@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 
 NUMBERS = (
     "glide_ratio", "min_sink_m_s", "stall_speed_m_s", "best_glide_speed_m_s", "top_speed_m_s", "climb_m_s",

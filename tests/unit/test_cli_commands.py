@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from scenarios.harness import gate, single
-from scenarios.harness.bench import STAGES
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
+from scenarios.harness.commands import check as gate
+from scenarios.harness.commands import fly as single
+from scenarios.harness.commands.bench import STAGES
 from sim import recording
 from sim.log import Outcome
 

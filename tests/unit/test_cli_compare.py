@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from estimator import ESTIMATORS
-from scenarios.harness import compare, compare_picture
 from scenarios.harness.checks import Row
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
+from scenarios.harness.commands import compare, compare_picture
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.metrics import Series, inclination_error_deg, rms
 from scenarios.harness.registry import find

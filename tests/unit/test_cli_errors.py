@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness import cli_values
-from scenarios.harness.cli import run
+from scenarios.harness.cli import values as cli_values
+from scenarios.harness.cli.app import run
 
 FLY = ("fly", "hand_launch")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from sim import gps_messages, recording
 from sim.gps_messages import LAUNCH, START
 

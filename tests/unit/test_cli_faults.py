@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenarios.harness import gate
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
+from scenarios.harness.commands import check as gate
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config
 from scenarios.harness.registry import find

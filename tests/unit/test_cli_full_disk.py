@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness import cli_reports
-from scenarios.harness.cli import run
-from sim import recording, rerun_view
+from scenarios.harness.cli import reports as cli_reports
+from scenarios.harness.cli.app import run
+from sim import recording
+from sim.view import rerun_view
 
 FLY = ["fly", "hand_launch", "--duration", "2", "--out", "flights"]
 

@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from scenarios.harness.cli import run
-from sim.signals import limited
+from scenarios.harness.cli.app import run
+from sim.outside.signals import limited
 
 HANGS_S = 300.0  # a line takes a second; the first with an estimator may compile, on a machine that is busy
 CODES = {0, 1, 2, 3, 130}

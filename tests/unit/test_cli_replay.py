@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from sim import recording
 
 DATA = Path(__file__).parents[1] / "reference" / "data" / "ap_ahrs_dcm"

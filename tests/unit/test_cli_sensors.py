@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.harness import sensor_names, sensor_page, sensor_trial
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
+from scenarios.harness.commands import sensor_names
+from scenarios.harness.commands import sensors as sensor_page
 from sim.clock import Rates
 from sim.params import unit_of, words_of
+from sim.sensors import trial as sensor_trial
 from sim.sensors.board import BoardParams
 from sim.sensors.datasheet import GENERIC, PERFECT, part_names
 from sim.sensors.fitting import SUITES

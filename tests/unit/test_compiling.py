@@ -10,11 +10,11 @@ import threading
 
 import pytest
 
-import estimator.jit
-from estimator import compiling, kernel_cache
-from scenarios.harness import console
-from scenarios.harness.cli import app, run
-from sim import signals
+import estimator.compiler.jit
+from estimator.compiler import compiling, kernel_cache
+from scenarios.harness.cli import console
+from scenarios.harness.cli.app import app, run
+from sim.outside import signals
 
 LINE = "compiling the kernels, once for this version: about half a minute\n"
 
@@ -43,8 +43,8 @@ def kernels(tmp_path, monkeypatch):
     def make():
         monkeypatch.delitem(sys.modules, "two", raising=False)
         module = importlib.import_module("two")  # a real one: the compiler looks its kernels up by its name
-        module.inner = estimator.jit.kernel(module.inner)
-        return estimator.jit.kernel(module.outer)
+        module.inner = estimator.compiler.jit.kernel(module.inner)
+        return estimator.compiler.jit.kernel(module.outer)
 
     return make
 

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from scenarios.harness.aboard import instruments_of
-from scenarios.harness.air_config import Wind, parse_wind
 from scenarios.harness.config import (
     AirConfig,
     FlightConfig,
@@ -18,6 +17,7 @@ from scenarios.harness.config import (
     override,
     resolve,
 )
+from scenarios.harness.config.air import Wind, parse_wind
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.plugins import equipped
 from sim.clock import Rates

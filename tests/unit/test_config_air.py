@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.harness.air_config import AirConfig, GustConfig, build_air, parse_gust, parse_turbulence
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from scenarios.harness.config import FlightConfig, override, resolve
+from scenarios.harness.config.air import AirConfig, GustConfig, build_air, parse_gust, parse_turbulence
 from sim.air import STILL
 from sim.recording import load
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from estimator import owner
-from sim.drafts import hidden, new_folder, probe, sweep
+from estimator.compiler import owner
+from sim.outside.drafts import hidden, new_folder, probe, sweep
 
 
 @pytest.fixture(scope="module")

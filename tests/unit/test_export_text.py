@@ -9,7 +9,7 @@ import pytest
 
 from estimator.interface import MEASURED_DTYPE
 from scenarios.harness import logs
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from scenarios.harness.replay import replay
 from sim import recording
 

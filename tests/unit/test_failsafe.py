@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from autopilot.autopilot import DcmAutopilot
+from autopilot.dcm import DcmAutopilot
 from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
 from autopilot.interface import Mode, Setpoint, Waypoint

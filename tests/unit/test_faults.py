@@ -12,7 +12,7 @@ from scipy import stats
 
 from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.config import FlightConfig, override, resolve
-from scenarios.harness.fault_config import parse_fault
+from scenarios.harness.config.faults import parse_fault
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log
 from sim.place import ELEVATION_M

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.harness import logs
 from scenarios.harness.logs.recorded import LogError
-from sim import files, sandbox
+from sim.outside import files, sandbox
 
 
 @pytest.mark.parametrize("name", ["log.csv", "log.mat", "log.bin", "log.ulg", "log.parquet", "x_in.csv"])

@@ -8,9 +8,9 @@ import pytest
 
 from autopilot.interface import ActuatorCommand
 from estimator.interface import AttitudeEstimate
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from sim import recording
-from sim.acceptance import Unusable, record_command, record_estimate
+from sim.flight_code import Unusable, record_command, record_estimate
 from sim.log import FLOWN_DTYPE, Log, Outcome
 from sim.sensors.fitting import SUITES
 from sim.sensors.suite import Suite
@@ -19,7 +19,7 @@ EYE = np.eye(3)
 FLY = ("fly", "bench_rest", "--set", "duration_s=0.2", "--no-rerun", "--estimator")
 REPLAY = ("replay", "log.csv", "--no-rerun", "--json", "r.json", "--estimator")
 HEAD = """import numpy as np
-from estimator.compiled import ESTIMATE_DTYPE
+from estimator.blocks.compiled import ESTIMATE_DTYPE
 from estimator.interface import AttitudeEstimate
 """
 MINE = f"""{HEAD}

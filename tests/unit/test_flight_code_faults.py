@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from scenarios.harness import plugins
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from scenarios.harness.plugins import load_estimator
 from sim import recording
 from sim.log import Outcome
-from sim.signals import TimedOut, limited
+from sim.outside.signals import TimedOut, limited
 
 # What is raised: what it needs at the head of the file, the statement, and the line that tells of it.
 RAISED = {
@@ -25,8 +25,8 @@ RAISED = {
     "endless": ("def deep(): return deep()", "deep()", r"RecursionError: maximum recursion depth exceeded.*"),
     "base": ("class Own(BaseException): pass", "raise Own('two\\nlines \\x1b[31m')", r"Own: two lines \\x1b\[31m"),
     "group": ("", "raise BaseExceptionGroup('two', [SystemExit(), ValueError()])", r"BaseExceptionGroup: two .*"),
-    "ours": ("from sim.signals import Interrupted", "raise Interrupted", r"Interrupted: no message"),
-    "late": ("from sim.signals import TimedOut", "raise TimedOut", r"TimedOut: no message"),
+    "ours": ("from sim.outside.signals import Interrupted", "raise Interrupted", r"Interrupted: no message"),
+    "late": ("from sim.outside.signals import TimedOut", "raise TimedOut", r"TimedOut: no message"),
     "syntax": ("", "exec('x =')", r"SyntaxError: invalid syntax \(<string>, line 1\)"),
     "silent": (
         "class Silent(Exception):\n    def __str__(self): raise SystemExit\n    __repr__ = __str__",

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimator import gps_lag
-from estimator.compiled import BELIEF
+from estimator.blocks import gps_lag
+from estimator.blocks.compiled import BELIEF
+from estimator.compiler.jit import kernel
 from estimator.interface import Column, dtype_of
-from estimator.jit import kernel
 
 PARAMS = (
     Column("gps_lag_filter", (), "", integer=True),

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator import gps_velocity, gyro_frame
+from estimator import gps_velocity
+from estimator.blocks import gyro_frame
 from estimator.gps_velocity import GpsVelocity, GpsVelocityParams
 from estimator.interface import MEASURED_DTYPE
 

@@ -7,15 +7,15 @@ import pytest
 from scipy import stats
 
 from autopilot.interface import NEUTRAL
-from estimator.magnetometer import hard_iron_from_extremes
+from estimator.blocks.magnetometer import hard_iron_from_extremes
 from sim import place
 from sim.clock import Rates
 from sim.log import Log
 from sim.magnetic_field import field_e_ut
-from sim.prescribed_plant import PrescribedPlant
+from sim.motion.prescribed_plant import PrescribedPlant
+from sim.motion.turn_table import TurnTable
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.suite import Suite, SuiteParams
-from sim.turn_table import TurnTable
 
 FIELD = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, place.YEAR)
 STRENGTH = float(np.linalg.norm(FIELD))

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.compiler.jit import kernel
 from estimator.ins_ekf import STATE_DTYPE, InsEkf, InsEkfParams
-from estimator.ins_ekf_flight import doubt_heading, turn_heading
-from estimator.ins_ekf_kernels import (
+from estimator.ins_ekf.flight import doubt_heading, turn_heading
+from estimator.ins_ekf.kernels import (
     BIAS,
     FORCE,
     GAIN,
@@ -29,7 +30,6 @@ from estimator.ins_ekf_kernels import (
     turn_in_body,
     turn_in_earth,
 )
-from estimator.jit import kernel
 
 PARAMS = InsEkfParams(gps_filter_s=1.0, gps_latency_s=0.3, gps_latency_sigma_s=0.0)  # a receiver that filters
 GYRO, FORCE_B = np.array([0.6, -0.9, 1.3]), np.array([1.5, -2.0, -13.0])

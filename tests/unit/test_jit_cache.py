@@ -11,13 +11,13 @@ from pathlib import Path
 import numba
 import pytest
 
-import estimator.jit
-from estimator import compiling, kernel_cache, owner
-from estimator.sources import ROOT, Sources, imported
+import estimator.compiler.jit
+from estimator.compiler import compiling, kernel_cache, owner
+from estimator.compiler.sources import ROOT, Sources, imported
 
 PARTS = ("jit", "kernel_cache", "sources", "compiling", "owner")
 CALLER = """
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 from estimator.callee import (  # (the callee)
     factor,
 )
@@ -27,14 +27,14 @@ def scaled(x):
     return factor(x)
 """
 CALLEE = """
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 @kernel
 def factor(x):
     return {factor} * x
 """
 APART = """
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 @kernel
 def apart(x):
@@ -53,7 +53,7 @@ def tree(tmp_path):
     package.mkdir()
     (package / "__init__.py").touch()
     for part in PARTS:
-        text = Path(estimator.jit.__file__).with_name(f"{part}.py").read_text()
+        text = Path(estimator.compiler.jit.__file__).with_name(f"{part}.py").read_text()
         (package / f"{part}.py").write_text(text)
     (package / "caller.py").write_text(CALLER)
     (package / "callee.py").write_text(CALLEE.format(factor=3.0))
@@ -102,7 +102,7 @@ def test_cache_own_file_that_calls_local_and_project_kernels_follows_edits_of_bo
     folder = tree / "mine"
     folder.mkdir()
     (folder / "helper.py").write_text(CALLEE.format(factor=7.0))
-    own = "from estimator.jit import kernel\nimport helper, estimator.callee as theirs\nmine = helper.factor\n"
+    own = "from estimator.compiler.jit import kernel\nimport helper, estimator.callee as theirs\nmine = helper.factor\n"
     own += "ours = theirs.factor\n\n@kernel\ndef both(x):\n    return mine(x) + ours(x)\n"
     (folder / "own.py").write_text(own)
     code = "from own import both; print(both(1.0), sum(both.stats.cache_hits.values()))"
@@ -154,7 +154,7 @@ class Here:
         exec(compile(self._source.read_text(), self._source, "exec"), names)
         compiling.on_trouble(told.append)
         try:
-            tiny = estimator.jit.kernel(names["tiny"])
+            tiny = estimator.compiler.jit.kernel(names["tiny"])
             return tiny(2.0), sum(tiny.stats.cache_hits.values()), told
         finally:
             compiling.on_trouble(None)

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from estimator.instruments import Known
-from scenarios.harness import sources
 from scenarios.harness.checks import Row
-from scenarios.harness.cli import run
-from scenarios.harness.ledger import Ledger
+from scenarios.harness.cli.app import run
+from scenarios.harness.gate import sources
+from scenarios.harness.gate.ledger import Ledger
 from scenarios.harness.preflight import prepared
 from scenarios.harness.verdict import FlightVerdict
 from sim.log import Outcome

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from scenarios.harness import logs
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from scenarios.harness.logs.recorded import LogError
 from scenarios.harness.replay import Window, replay, why_none
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.blocks.magnetometer import FIELD_RANGE_UT, believable, turn_to_north
+from estimator.compiler.jit import kernel
 from estimator.dilshad import Dilshad
 from estimator.interface import MEASURED_DTYPE, Measurements
-from estimator.jit import kernel
-from estimator.magnetometer import FIELD_RANGE_UT, believable, turn_to_north
 from estimator.starlino import Starlino
 
 N = 400

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sim import aircraft as aircraft_package
-from sim.loft import section, signed_volume_m3
-from sim.mesh import KEYS, PANELS, STRAIGHT_WING, aeroplane, geometry_of
+from sim.view.loft import section, signed_volume_m3
+from sim.view.mesh import KEYS, PANELS, STRAIGHT_WING, aeroplane, geometry_of
 
 ROUND_OFF_M = 1e-12  # a few operations on lengths of about a metre
 STRAIGHT = {

@@ -6,14 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from scenarios.harness.manoeuvres import (
-    RollOut,
-    loops_end_s,
-    most_loops,
-    roll_outs,
-    slowest_recovery,
-    turns_of_pitch,
-)
 from scenarios.harness.metrics import (
     NOTHING,
     Measured,
@@ -44,6 +36,14 @@ from scenarios.harness.metrics import (
     summary,
     survived,
     wind_error_m_s,
+)
+from scenarios.harness.metrics.manoeuvres import (
+    RollOut,
+    loops_end_s,
+    most_loops,
+    roll_outs,
+    slowest_recovery,
+    turns_of_pitch,
 )
 from sim.log import Flight, Log, Outcome, Phase
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness.cli import run
+from scenarios.harness.cli.app import run
 from scenarios.harness.own_files import module_of_file
 from scenarios.harness.plugins import load_estimator
 from scenarios.harness.registry import find
@@ -19,7 +19,7 @@ KERNELS = """
 import numba
 import numpy as np
 from estimator.interface import AttitudeEstimate
-from estimator.jit import kernel
+from estimator.compiler.jit import kernel
 
 @numba.njit(cache=True)
 def once(x):

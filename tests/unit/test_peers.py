@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator import peers
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
+from estimator.peers import peers
 from estimator.rotation import rotation_error_rad
 
 for name in ("ahrs", "imufusion", "vqf"):

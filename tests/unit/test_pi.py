@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimator.pi import feed_back, weigh
+from estimator.blocks.pi import feed_back, weigh
 
 
 def test_weigh_two_corrections_is_eqn_28():

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from autopilot.interface import Mode, Setpoint
-from autopilot.manoeuvres import (
+from autopilot.figures import (
     RunIn,
     aileron_roll,
     immelmann,
@@ -20,6 +19,7 @@ from autopilot.manoeuvres import (
     stall_turn,
     vertical_climb,
 )
+from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Manoeuvre, Script
 
 AFTER = Setpoint(Mode.COURSE, course_rad=1.0)

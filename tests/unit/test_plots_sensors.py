@@ -4,10 +4,10 @@ import numpy as np
 
 from sim.clock import Rates
 from sim.log import Log
-from sim.plots import curves, limits
 from sim.sensors.air_data import AirspeedParams, BarometerParams
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.suite import Suite, SuiteParams
+from sim.view.plots import curves, limits
 
 
 def drawn(params):

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator import premerlani
+from estimator.blocks.pi import feed_back
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample
-from estimator.pi import feed_back
 from estimator.premerlani import Premerlani, PremerlaniParams
 from estimator.rotation import heading_rad, inclination_error_rad
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimator.blocks.screening import CLOCK_BACK_S, COAST_S
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
 from estimator.premerlani import Premerlani, PremerlaniParams
-from estimator.screening import CLOCK_BACK_S, COAST_S
 
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 SANE = st.floats(-40.0, 40.0)

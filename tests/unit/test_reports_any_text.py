@@ -8,11 +8,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from scenarios.harness import compare, console, gate
 from scenarios.harness.checks import Row
+from scenarios.harness.cli import console
+from scenarios.harness.commands import check as gate
+from scenarios.harness.commands import compare
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict
 from sim.log import Outcome
-from sim.wording import brief, json_text, markdown, plotted, printable
+from sim.outside.wording import brief, json_text, markdown, plotted, printable
 
 TEXTS = {
     "surrogate": "a\ud800b", "file_name": "filter\udcff.py:F", "control": "\x00\x07\x08\x1b[31mred\x7f",

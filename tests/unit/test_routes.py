@@ -7,7 +7,7 @@ import pytest
 
 from autopilot.interface import Waypoint
 from scenarios.harness.metrics import over, rms
-from scenarios.harness.routes import height_missing_m, off_route_m, reached, waypoints_reached
+from scenarios.harness.metrics.routes import height_missing_m, off_route_m, reached, waypoints_reached
 from sim.log import Flight, Log, Outcome, Phase
 
 SQUARE = (Waypoint(200, 0, 60), Waypoint(200, 200, 100), Waypoint(0, 200, 60), Waypoint(0, 0, 60))

@@ -7,15 +7,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.interface import NEUTRAL
-from estimator.magnetometer import Calibration, soft_iron_from_ellipsoid
+from estimator.blocks.magnetometer import Calibration, soft_iron_from_ellipsoid
 from sim import place
 from sim.clock import Rates
 from sim.log import Log
 from sim.magnetic_field import field_e_ut
-from sim.prescribed_plant import PrescribedPlant
+from sim.motion.prescribed_plant import PrescribedPlant
+from sim.motion.turn_table import TurnTable
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.suite import SUITES, Suite, SuiteParams
-from sim.turn_table import TurnTable
 
 FIELD = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, place.YEAR)
 TABLE = TurnTable(heading_rad=math.atan2(FIELD[1], FIELD[0]))

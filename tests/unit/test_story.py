@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sim.log import Flight, Log, Outcome
-from sim.story import story
+from sim.view.story import story
 
 
 @pytest.mark.parametrize(("release_s", "said"), [(0.0, "at 2.0 s"), (1.3, "at 0.7 s")])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from estimator import wind
+from estimator.blocks import wind
 from estimator.interface import dtype_of
 
 STATE = dtype_of(wind.WIND_FILTER)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness.workers import fly_each
+from scenarios.harness.gate.workers import fly_each
 from sim.log import Outcome
 
 
@@ -120,7 +120,7 @@ def test_workers_end_when_the_process_that_began_them_is_killed(tmp_path: Path) 
     program = f"""
         import os
         from pathlib import Path
-        from scenarios.harness.workers import fly_each
+        from scenarios.harness.gate.workers import fly_each
 
         class Hang:
             def fly(self):

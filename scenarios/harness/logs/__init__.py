@@ -1,7 +1,8 @@
 """Recorded logs from anywhere, read into the rows that estimators take.
 
 One module per format; each has ``read(path, ...) -> RecordedLog``.  `read` picks the module by the file.  It is also
-the border to files of strangers: whatever a reader raises becomes a `LogError` of one line here, see `sim.files`.
+the border to files of strangers: whatever a reader raises becomes a `LogError` of one line here, see
+`sim.outside.files`.
 """
 
 from dataclasses import replace
@@ -13,8 +14,8 @@ import numpy as np
 from scenarios.harness.logs import accounts, checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
 from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog
-from sim import files
-from sim.wording import printable
+from sim.outside import files
+from sim.outside.wording import printable
 
 _BY_MAP = {  # columns of numbers, which a column map explains
     **dict.fromkeys((".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz"), "text"),

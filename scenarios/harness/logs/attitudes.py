@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp  # type: ignore[import-untyped]
 
+from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.interface import Array
 from estimator.rotation import from_euler
-from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import accounts, checks
 from scenarios.harness.logs.quantities import EULER, MATRIX, QUATERNION
 from scenarios.harness.logs.recorded import LogError
-from sim.drawable import is_rotation
+from sim.view.drawable import is_rotation
 
 NOT_STARTED = "of a filter that had not started"
 NO_ROTATION = "no rotation"

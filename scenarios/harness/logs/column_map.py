@@ -44,8 +44,8 @@ from scenarios.harness.logs.quantities import QUANTITIES, Meaning
 from scenarios.harness.logs.recorded import LogError
 from scenarios.harness.logs.units import UNITS
 from scenarios.harness.plugins import near_misses
-from sim import files
-from sim.wording import printable
+from sim.outside import files
+from sim.outside.wording import printable
 
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
 Kind = Literal["truth", "filter", "firmware"]

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import Array
-from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import streams, tabular
 from scenarios.harness.logs.ardupilot import FIX_3D, Parameters, year_of
 from scenarios.harness.logs.ardupilot_matlab import MatlabMessages

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from estimator.interface import Array
 from scenarios.harness.logs import foreign
 from scenarios.harness.logs.recorded import LogError
-from sim import files
+from sim.outside import files
 
 HEADER, FMT, FMT_LENGTH = b"\xa3\x95", 128, 89
 _DEG = np.pi / 180.0

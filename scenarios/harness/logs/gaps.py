@@ -8,8 +8,8 @@ whole, relative to that grid, than the times before it.
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.interface import Array
-from estimator.screening import LONGEST_GAP_S
 
 LONG = 1.5  # in usual intervals: a step up to this long is no gap, whatever follows
 BEHIND = 0.6  # in usual intervals: how much later the times after a gap are, on the whole

@@ -18,7 +18,7 @@ from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
 from scenarios.harness.logs.column_names import automatic
 from scenarios.harness.logs.quantities import Meaning
 from scenarios.harness.logs.recorded import LogError, RecordedLog
-from sim import files, sandbox
+from sim.outside import files, sandbox
 
 LABELS = ("_label", "_labels", "_names", "_header")  # behind the name of a matrix: the array of its columns' names
 WIDEST = 64  # a matrix with more columns is no table

@@ -11,10 +11,11 @@ from estimator.interface import Array, ImuSample
 from scenarios.harness.logs import attitudes, properties
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
-from sim import files, recording
+from sim import recording
 from sim.log import Flight
+from sim.outside import files
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
-from sim.story import setting
+from sim.view.story import setting
 
 
 def read(path: Path) -> RecordedLog:

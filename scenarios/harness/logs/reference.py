@@ -24,7 +24,7 @@ from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.text_table import LARGEST
 from scenarios.harness.logs.validity import usable
-from sim import files
+from sim.outside import files
 
 COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
 LEAST_FIX = 3  # a fix of three dimensions

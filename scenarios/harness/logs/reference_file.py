@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.interface import Array
-from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import accounts, attitudes, checks
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog, Reference

@@ -15,16 +15,16 @@ import pymap3d  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
+from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
-from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import checks, gaps, tabular
 from scenarios.harness.logs.accounts import NO_FIX as NO_FIX
 from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.validity import usable
-from sim import files
+from sim.outside import files
 
 Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
 SLOWEST_S = 0.1  # an inertial unit logged more slowly is not to be integrated

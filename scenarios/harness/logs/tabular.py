@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
-from estimator.screening import LONGEST_GAP_S
 from scenarios.harness.logs import accounts, attitudes, checks, fixes, properties
 from scenarios.harness.logs.attitudes import at_times as at_times
 from scenarios.harness.logs.attitudes import attitude as attitude
@@ -25,7 +25,7 @@ from scenarios.harness.logs.quantities import EULER, FIELD, INERTIAL
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.units import COUNTS
 from scenarios.harness.logs.validity import usable
-from sim import files
+from sim.outside import files
 
 Table = dict[str, Array]
 CLIMB_M = 5.0  # a receiver whose height changes by more than this, at no vertical velocity, does not report one

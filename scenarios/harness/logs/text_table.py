@@ -21,7 +21,7 @@ from estimator.interface import Array
 from scenarios.harness.logs import foreign, units
 from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.recorded import LogError
-from sim import files
+from sim.outside import files
 
 DELIMITERS = (";", "\t", ",", "|")
 REMARKS = ("#", "%", "//")

@@ -25,7 +25,7 @@ from scenarios.harness.logs.ardupilot import FLYING_M_S
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Kind, Stream
 from scenarios.harness.logs.ulog_bytes import whole
-from sim import files
+from sim.outside import files
 
 ATTITUDES: tuple[tuple[str, Kind], ...] = (
     ("vehicle_attitude_groundtruth", "truth"), ("vehicle_attitude", "filter"),

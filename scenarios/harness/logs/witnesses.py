@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
+from estimator.blocks.kernels import wrap
 from estimator.interface import Array
-from estimator.kernels import wrap
 from scenarios.harness.logs.recorded import Reference
 
 WINDOW_S = 0.2  # long enough to rise above the noise, short enough for a small angle

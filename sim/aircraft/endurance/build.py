@@ -7,10 +7,10 @@ The outline is in airframe.toml; PROVENANCE.md tells where each figure comes fro
 
 from pathlib import Path
 
-from sim.aircraft import builder
-from sim.aircraft.builder import Design, Drive
-from sim.aircraft.lattice import Sections
-from sim.aircraft.masses import Box, Spread
+from sim.aircraft.design import builder
+from sim.aircraft.design.builder import Design, Drive
+from sim.aircraft.design.lattice import Sections
+from sim.aircraft.design.masses import Box, Spread
 
 DESIGN = Design(
     folder=Path(__file__).parent,

@@ -1,0 +1,492 @@
+"""ArduPilot's AP_AHRS_DCM as it was on 12 July 2013, the algorithm that van Zundert et al. carried to Simulink.
+
+One pass per inertial sample: integrate the gyros and renormalise (their chapter 2), correct yaw by compass or by
+the course over ground (3.1), and, at every GPS fix, correct all three axes by the mean specific force of the
+interval seen in the earth frame, against gravity and the change of GPS velocity (3.2; Premerlani's note of 2011).
+The proportional terms are held in between; the integral is taken over every five seconds of slow rotation.
+
+Quirks
+------
+What the original did and a later version, or any reader, would mend, stands behind a name in `Quirk`.
+`JULY_2013` has them all and is the original; the empty set, the default, is the same algorithm mended.
+
+The report's text departs from the code that it describes
+---------------------------------------------------------
+* The integral is not "set equal to" the saturated sum: the saturated sum is added to it, and cleared.
+* Eqn 3.12 integrates the error in the earth frame; the code integrates it in the body frame, as Eqn 3.11 has it.
+* The third element of the error (Eqn 3.9) is zeroed with a compass and without GPS only.
+* Without GPS the correction comes once in 0.2 s, and the proportional term is held from one to the next.
+
+Left out: the trim of the board, the eightfold gains before arming, the position.  The rate that is told has no
+proportional terms in it: these turn the estimate, not the aeroplane.  Beyond the original: samples are screened as
+for every estimator here, steps of more than 0.2 rad are taken in parts, and power-up levels on the mean sample if
+it is given one; ``reset(None)`` is level and north, as in 2013.
+
+References
+----------
+ArduPilot, libraries/AP_AHRS/AP_AHRS_DCM, revision 279f6d00 of 10 July 2013; delay line: 56bcda72 of 5 November 2013.
+J. van Zundert, F. Bruning, B. de Jager, "Direction cosine matrix based IMU implementation in Matlab/Simulink", 2013.
+W. Premerlani, "Roll-pitch gyro drift compensation", 2011, Eqns 3-5.   W. Premerlani, "Fast rotations", 2011.
+"""
+
+import math
+from dataclasses import fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimator.ap_dcm.params import JULY_2013, MOST_FIXES, ApDcmParams, Quirk
+from estimator.ap_dcm.wind import AIR_LIFE_S, learn_wind
+from estimator.blocks.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
+from estimator.blocks.kernels import clip, wrap
+from estimator.blocks.magnetometer import FIELD, take_field, write_calibration
+from estimator.blocks.screening import (
+    FORCE_GOOD,
+    G_M_S2,
+    GPS,
+    SCREEN,
+    airspeed_came,
+    attitude_at_rest,
+    offset_at_rest,
+    refuse,
+    screen,
+    take_rate,
+)
+from estimator.compiler.jit import kernel
+from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.rotation import LONGEST_STEP_RAD, level, propagate, renormalise_exactly
+
+LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost
+SPIN_LIMIT_RAD_S = math.radians(20.0)  # no offset is learnt while turning faster
+LEARN_S = 5.0 + 1e-5  # the integral moves once in so much slow rotation: 25 fixes of 0.2 s in float32 just miss it
+YAW_LEARN_S = 2.0  # a yaw reference older than this teaches no offset
+NO_GPS_S = 0.2 - 1e-5  # interval of correction without GPS: 20 samples of 10 ms just reach it
+YAW_DECAY = 0.97  # of the proportional yaw term, in each sample without a reference
+YAW_FADE_HZ = -50.0 * math.log(YAW_DECAY)  # the same at any sample rate, as it was at 50 Hz
+MIN_SPEED_M_S = 3.0  # slowest ground speed with a course
+LOST_S, LOST_M_S, LOST_RAD = 20.0, 9.0, 1.047  # heading is set to the course after so long, or if fast and so far off
+COS_OFF_COURSE, OFF_COURSE_S = math.cos(math.radians(45.0)), 2.0  # a compass so far off for so long is not used
+LAUNCH_M_S2 = 7.0  # forward specific force of a throw
+CLIP_G = 0.5
+FIX_LIFE_S, FIELD_LIFE_S = 2.0, 0.5  # an older sample is none
+
+_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
+_SETTINGS = tuple(f for f in fields(ApDcmParams) if f.name not in ("quirks", "use_magnetometer", "calibration"))
+_PARAMS = (
+    *(
+        Column(f.name, (), "see ApDcmParams", integer=isinstance(f.default, int))
+        for f in _SETTINGS
+        if f.name not in _RANGES
+    ),
+    Column("use_magnetometer", (), "1 where its samples are taken", integer=True),
+    *(Column(quirk.value, (), "see Quirk", integer=True) for quirk in Quirk),
+)
+_STATE = (
+    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
+    Column("omega_p_b", (3,), "proportional roll-pitch correction, held between two of them, Eqn 3.11"),
+    Column("omega_yaw_p", (), "proportional yaw correction, about body z, Eqn 3.4"),
+    Column("omega_i_b", (3,), "integral correction; minus the offset still found"),
+    Column("omega_sum_b", (3,), "what the integral will move by, Eqns 3.5 and 3.12"),
+    Column("sum_s", (), "time of slow rotation in that sum"),
+    Column("omega_total_b", (3,), "corrected rate that is integrated, Eqn 2.1"),
+    Column("spin_rad_s", (), "length of the corrected rate without proportional terms"),
+    Column("R_euler_eb", (3, 3), "attitude whose roll, pitch and yaw are used"),
+    Column("error_b", (3,), "roll-pitch-yaw error of the specific force, body axes, Eqn 3.10"),
+    Column("yaw_found", (), "1 once heading was set", integer=True),
+    Column("force_sum_e_m_s", (3,), "integral of the specific force seen from the earth, Eqn 3.7"),
+    Column("force_s", (), "time in that sum"),
+    Column("interval_s", (), "time since the last correction"),
+    Column("begun", (), "1 once a velocity begins the interval", integer=True),
+    Column("lock", (), "1 if the interval began with a fix", integer=True),
+    Column("force_e_g", (3,), "mean specific force, seen from the earth"),
+    Column("reference_e", (3,), "what it should be in direction, Eqn 3.8 and the note's Eqn 3"),
+    Column("delayed", (MOST_FIXES, 3), "mean specific forces that wait for their velocity"),
+    Column("oldest", (), "index of the oldest of them", integer=True),
+    Column("delay_begun", (), "1 once they are there", integer=True),
+    Column("v_e_m_s", (3,), "velocity at the end of the interval"),
+    Column("v_last_e_m_s", (3,), "velocity at its beginning"),
+    Column("new_fix", (), "1 where a usable fix arrived in this tick", integer=True),
+    Column("fix_age_s", (), "time since it"),
+    Column("course_rad", (), "its course"),
+    Column("course", (2,), "the same as a unit vector, north and east"),
+    Column("speed_m_s", (), "its ground speed"),
+    Column("new_course", (), "1 while the last fix has not corrected yaw", integer=True),
+    Column("field_age_s", (), "time since it"),
+    Column("new_field", (), "1 while it has not corrected yaw", integer=True),
+    Column("airspeed_m_s", (), "last airspeed measured, or of the last fix less the wind"),
+    Column("air_age_s", (), "time since the last one measured"),
+    Column("off_course_s", (), "how long the compass has been off the course"),
+    Column("compass", (), "1 where the compass is to be used", integer=True),
+    Column("compass_yaw_s", (), "when the compass last corrected yaw"),
+    Column("course_yaw_s", (), "when the course last corrected yaw"),
+    Column("nose_last", (3,), "nose at the last wind estimate"),
+    Column("v_wind_e_m_s", (3,), "velocity at the last wind estimate"),
+    Column("wind_s", (), "when that was; before any, long ago"),
+)
+STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + FIELD + _PARAMS + _STATE)
+
+
+@kernel
+def take_arrivals(row, s):  # type: ignore[no-untyped-def]
+    """Take what arrived of GPS, magnetometer and airspeed, if it can be believed."""
+    s.fix_age_s += s.dt_s
+    s.field_age_s += s.dt_s
+    s.air_age_s += s.dt_s
+    s.new_fix = 0
+    if row.gps_new:
+        v, course, speed = row.gps_v_e_m_s, row.gps_course_rad, row.gps_speed_m_s
+        moving = abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0  # NaN is not
+        if moving and abs(course) < 100.0 and 0.0 <= speed < 1000.0:
+            s.new_fix, s.new_course, s.fix_age_s, s.course_rad, s.speed_m_s = 1, 1, 0.0, course, speed
+            s.course[0], s.course[1] = np.cos(course), np.sin(course)
+        else:
+            refuse(s, GPS)
+    if s.use_magnetometer and take_field(row, s):
+        s.new_field, s.field_age_s = 1, 0.0
+    if airspeed_came(row, s):
+        s.airspeed_m_s, s.air_age_s = max(row.airspeed_m_s, 0.0), 0.0
+
+
+@kernel
+def turn(row, s, good):  # type: ignore[no-untyped-def]
+    """Integrate the corrected rate (Eqns 2.1-2.3) and renormalise; a lost matrix goes back to the sample before."""
+    for i in range(3):
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i] - s.omega_i_b[i]
+    take_rate(row, s, good)
+    w, total = s.omega_b_rad_s, s.omega_total_b
+    s.spin_rad_s = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    for i in range(3):
+        total[i] = w[i] + s.omega_p_b[i]
+    total[2] += s.omega_yaw_p
+    if s.stale_euler:
+        _copy(s.R_eb, s.R_euler_eb)
+    angle_rad = s.dt_s * np.sqrt(total[0] * total[0] + total[1] * total[1] + total[2] * total[2])
+    parts = 1
+    if angle_rad >= LONGEST_STEP_RAD:  # NaN is not: its one part finds the matrix lost
+        parts += int(min(angle_rad / LONGEST_STEP_RAD, 1000.0))
+    for _ in range(parts):
+        propagate(s.R_eb, total, s.dt_s / parts)
+        if not renormalise_exactly(s.R_eb):
+            _begin_anew(s)
+            break
+    if not s.stale_euler:
+        _copy(s.R_eb, s.R_euler_eb)
+
+
+@kernel
+def _begin_anew(s):  # type: ignore[no-untyped-def]
+    """Go back to the attitude of the sample before, or level, and forget all corrections: one of them spoilt it."""
+    _copy(s.R_euler_eb, s.R_eb)
+    if not renormalise_exactly(s.R_eb):
+        level(s.R_eb)
+    s.omega_yaw_p = s.sum_s = s.spin_rad_s = 0.0
+    for i in range(3):
+        s.omega_p_b[i] = s.omega_i_b[i] = s.omega_sum_b[i] = s.omega_b_rad_s[i] = 0.0
+        s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i]
+
+
+@kernel
+def _copy(source, target):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        for j in range(3):
+            target[i, j] = source[i, j]
+
+
+@kernel
+def _yaw(R_eb):  # type: ignore[no-untyped-def]
+    return np.arctan2(R_eb[1, 0], R_eb[0, 0])
+
+
+@kernel
+def set_heading(s, heading_rad):  # type: ignore[no-untyped-def]
+    """Set the heading: the matrix of the Euler angles' roll and pitch, and of `heading_rad`."""
+    angle = heading_rad - _yaw(s.R_euler_eb)
+    c, z = np.cos(angle), np.sin(angle)
+    for j in range(3):
+        north, east = s.R_euler_eb[0, j], s.R_euler_eb[1, j]
+        s.R_eb[0, j], s.R_eb[1, j], s.R_eb[2, j] = c * north - z * east, z * north + c * east, s.R_euler_eb[2, j]
+    s.omega_yaw_p = 0.0
+    s.yaw_found = 1
+
+
+@kernel
+def judge_compass(s):  # type: ignore[no-untyped-def]
+    """Set ``s.compass``: not if far off a course that wind alone cannot explain."""
+    off = False
+    if s.fly_forward and s.fix_age_s <= FIX_LIFE_S and s.speed_m_s >= MIN_SPEED_M_S:
+        w, x, y = s.wind_e_m_s, s.R_euler_eb[0, 0], s.R_euler_eb[1, 0]
+        calm = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < (0.8 * s.speed_m_s) ** 2
+        off = calm and x * s.course[0] + y * s.course[1] < COS_OFF_COURSE * np.sqrt(x * x + y * y)
+    s.off_course_s = s.off_course_s + s.dt_s if off else 0.0
+    s.compass = s.field_age_s <= FIELD_LIFE_S and s.off_course_s <= (0.0 if s.hasty_compass else OFF_COURSE_S)
+
+
+@kernel
+def compass_error(s):  # type: ignore[no-untyped-def]
+    """Earth-frame yaw error of the magnetometer (Eqns 3.1 and 3.2); sets the heading the first time."""
+    m = s.field_b_ut
+    north = s.R_eb[0, 0] * m[0] + s.R_eb[0, 1] * m[1] + s.R_eb[0, 2] * m[2]  # Eqn 3.1
+    east = s.R_eb[1, 0] * m[0] + s.R_eb[1, 1] * m[1] + s.R_eb[1, 2] * m[2]
+    length = np.sqrt(north * north + east * east)
+    if length < 1e-9:  # it points straight down: no direction
+        return 0.0
+    if not s.yaw_found:
+        set_heading(s, _yaw(s.R_eb) + s.declination_rad - np.arctan2(east, north))
+        return 0.0
+    return (north * np.sin(s.declination_rad) - east * np.cos(s.declination_rad)) / length  # Eqn 3.2
+
+
+@kernel
+def course_error(s):  # type: ignore[no-untyped-def]
+    """Earth-frame yaw error against the course; sets the heading to it where yaw is lost."""
+    apart = s.course_rad - _yaw(s.R_euler_eb)
+    far = abs(apart if s.unwrapped_course else wrap(apart)) >= LOST_RAD
+    known_s = s.course_yaw_s if s.compass_is_no_yaw else max(s.course_yaw_s, s.compass_yaw_s)
+    if not s.yaw_found or s.clock_s - known_s > LOST_S or (s.speed_m_s >= LOST_M_S and far):
+        set_heading(s, s.course_rad)
+        return 0.0
+    return np.sin(apart)
+
+
+@kernel
+def correct_yaw(s):  # type: ignore[no-untyped-def]
+    """Yaw correction by compass or course (Eqns 3.3-3.5): body z alone is corrected."""
+    judge_compass(s)
+    if s.compass and s.new_field:
+        now_s = s.clock_s - s.field_age_s
+        since_s = now_s - s.compass_yaw_s
+        error = compass_error(s)
+        s.compass_yaw_s, s.new_field = now_s, 0
+    elif not s.compass and s.fly_forward and s.new_course and s.speed_m_s >= MIN_SPEED_M_S:
+        now_s = s.clock_s - s.fix_age_s
+        since_s = now_s - s.course_yaw_s
+        error = course_error(s)
+        s.course_yaw_s, s.new_course = now_s, 0
+    else:
+        s.omega_yaw_p *= YAW_DECAY if s.decay_per_sample else np.exp(-YAW_FADE_HZ * s.dt_s)
+        return
+    error *= s.R_eb[2, 2]  # Eqn 3.3
+    s.omega_yaw_p = s.kp_yaw * spin_gain(s) * error  # Eqn 3.4
+    if since_s < YAW_LEARN_S and s.spin_rad_s < SPIN_LIMIT_RAD_S:
+        s.omega_sum_b[2] += s.ki_yaw * error * since_s  # Eqn 3.5
+
+
+@kernel
+def spin_gain(s):  # type: ignore[no-untyped-def]
+    """One up to 50 deg/s, ten from 500 deg/s on ("Fast rotations")."""
+    fast = np.degrees(50.0) if s.stuck_p_gain else np.radians(50.0)
+    return clip(s.spin_rad_s / fast, 1.0, 10.0)
+
+
+@kernel
+def end_of_interval(row, s):  # type: ignore[no-untyped-def]
+    """Whether the specific force can be compared now; sets the velocity ``s.v_e_m_s`` at the end of the interval."""
+    v, wind = s.v_e_m_s, s.wind_e_m_s
+    if s.fix_age_s <= FIX_LIFE_S:
+        if not s.new_fix:
+            return False
+        for i in range(3):
+            v[i] = row.gps_v_e_m_s[i]
+            if not s.lock:
+                s.v_last_e_m_s[i] = v[i]
+        s.lock = 1
+        if s.air_age_s > AIR_LIFE_S:
+            s.airspeed_m_s = np.hypot(v[0] - wind[0], v[1] - wind[1])
+    else:
+        if s.interval_s < NO_GPS_S:
+            return False
+        for i in range(3):  # how the nose turns is what remains to tell of the motion
+            v[i] = s.R_eb[i, 0] * s.airspeed_m_s + wind[i]
+        s.lock = 0
+    if s.begun:
+        return True
+    s.begun = 1  # the first velocity ends no interval
+    for i in range(3):
+        s.v_last_e_m_s[i] = v[i]
+    return False
+
+
+@kernel
+def compare_force(s):  # type: ignore[no-untyped-def]
+    """Fill ``s.error_b``: mean specific force of the interval x gravity and GPS acceleration (note's Eqns 3-5)."""
+    force, reference = s.force_e_g, s.reference_e
+    reference[0], reference[1], reference[2] = 0.0, 0.0, -1.0  # Eqn 3.8
+    moving = s.lock or s.fly_forward
+    for i in range(3):
+        force[i] = s.force_sum_e_m_s[i] / (s.force_s * G_M_S2)  # Eqn 3.7
+        if moving:
+            change = s.gps_gain * (s.v_e_m_s[i] - s.v_last_e_m_s[i]) / (s.interval_s * G_M_S2)
+            reference[i] += clip(change, -CLIP_G, CLIP_G) if i == 2 and s.vertical_clip else change
+    _normalise(reference)
+    if not s.short_force or force[0] ** 2 + force[1] ** 2 + force[2] ** 2 > 1.0:
+        _normalise(force)
+    if moving and s.gps_delay_fixes > 0:
+        delay_force(s)
+    x = force[1] * reference[2] - force[2] * reference[1]  # Eqn 3.9
+    y = force[2] * reference[0] - force[0] * reference[2]
+    z = force[0] * reference[1] - force[1] * reference[0]
+    if s.compass:  # yaw is the compass's, except as far as a bank lets the acceleration tell it
+        R = s.R_euler_eb
+        known = s.fix_age_s <= FIX_LIFE_S and s.gps_gain == 1.0
+        z *= abs(R[2, 1]) / max(np.hypot(R[2, 1], R[2, 2]), 1e-9) if known else 0.0
+    for j in range(3):
+        s.error_b[j] = s.R_eb[0, j] * x + s.R_eb[1, j] * y + s.R_eb[2, j] * z  # Eqn 3.10
+
+
+@kernel
+def _normalise(a):  # type: ignore[no-untyped-def]
+    """Scale to unit length, in place; a vector without direction becomes zero."""
+    length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    scale = 1.0 / length if length > 1e-9 else 0.0
+    for i in range(3):
+        a[i] *= scale
+
+
+@kernel
+def delay_force(s):  # type: ignore[no-untyped-def]
+    """Exchange ``s.force_e_g`` for the one of `gps_delay_fixes` intervals ago."""
+    for i in range(3):
+        now = s.force_e_g[i]
+        if not s.delay_begun:
+            for back in range(MOST_FIXES):
+                s.delayed[back, i] = now
+        s.force_e_g[i] = s.delayed[s.oldest, i]
+        s.delayed[s.oldest, i] = now
+    s.delay_begun = 1
+    s.oldest = (s.oldest + 1) % s.gps_delay_fixes
+
+
+@kernel
+def sum_force(row, s, good):  # type: ignore[no-untyped-def]
+    """Add the sample to the mean specific force of the interval, seen from the earth (Eqns 3.6 and 3.7)."""
+    f = row.force_b_m_s2
+    s.interval_s += s.dt_s
+    if good & FORCE_GOOD:
+        s.force_s += s.dt_s
+        for i in range(3):
+            s.force_sum_e_m_s[i] += (s.R_eb[i, 0] * f[0] + s.R_eb[i, 1] * f[1] + s.R_eb[i, 2] * f[2]) * s.dt_s
+
+
+@kernel
+def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
+    """At the end of an interval, correct by its mean specific force (Eqns 3.8-3.12)."""
+    if not end_of_interval(row, s):
+        return
+    if s.force_s > 0.5 * s.interval_s:  # else too little of the interval was felt
+        compare_force(s)
+    else:
+        s.error_b[0] = s.error_b[1] = s.error_b[2] = 0.0
+    gain = s.kp * spin_gain(s)
+    if good & FORCE_GOOD and thrown(row.force_b_m_s2[0], s):
+        gain *= 0.5
+    for i in range(3):
+        s.omega_p_b[i] = gain * s.error_b[i]  # Eqn 3.11
+        if s.spin_rad_s < SPIN_LIMIT_RAD_S:
+            s.omega_sum_b[i] += s.ki * s.error_b[i] * s.interval_s  # Eqn 3.12, in the body frame
+    if s.spin_rad_s < SPIN_LIMIT_RAD_S:
+        s.sum_s += s.interval_s
+    if s.sum_s >= LEARN_S:
+        limit = s.gyro_drift_rad_s2 * s.sum_s
+        for i in range(3):
+            s.omega_i_b[i] += clip(s.omega_sum_b[i], -limit, limit)
+            s.omega_sum_b[i] = 0.0
+        s.sum_s = 0.0
+    if s.lock and s.fly_forward and s.estimate_wind:
+        learn_wind(s)
+    forget_interval(s)
+    for i in range(3):
+        s.v_last_e_m_s[i] = s.v_e_m_s[i]
+
+
+@kernel
+def thrown(forward_m_s2, s):  # type: ignore[no-untyped-def]
+    """Whether an aeroplane that is not fast yet is pushed forward, at less than 30 degrees of pitch."""
+    slow = s.fix_age_s <= FIX_LIFE_S and s.speed_m_s < MIN_SPEED_M_S
+    return s.fly_forward and slow and forward_m_s2 >= LAUNCH_M_S2 and abs(s.R_euler_eb[2, 0]) < 0.5
+
+
+@kernel
+def forget_interval(s):  # type: ignore[no-untyped-def]
+    """Begin a new interval of the mean specific force."""
+    s.interval_s = s.force_s = 0.0
+    for i in range(3):
+        s.force_sum_e_m_s[i] = 0.0
+
+
+@kernel
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One inertial sample, in the original's order; returns the `Health`."""
+    row, s = rows[k], state[0]
+    before = s.rejected
+    good = screen(row, s)
+    if good:
+        take_arrivals(row, s)
+        if s.dt_s > LONGEST_PAUSE_S:
+            forget_interval(s)
+            s.lock = 0  # nor does the old velocity belong to the new interval
+        else:
+            turn(row, s, good)
+            sum_force(row, s, good)  # before a heading is set: the interval was felt in the frame of until now
+            correct_yaw(s)
+            correct_by_force(row, s, good)
+    if s.rejected != before:
+        return 2  # Health.POOR
+    if not s.yaw_found:
+        return 0  # Health.STARTING
+    return 1 if s.fix_age_s <= FIX_LIFE_S or s.compass else 2  # Health.GOOD
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+        write_wind(state[0], estimates[k])
+
+
+class ApDcm(Compiled):
+    """ArduPilot's DCM of July 2013, mended unless the parameters say otherwise.
+
+    Parameters
+    ----------
+    params : settings and quirks
+    """
+
+    heading_reference: HeadingReference = "course"  # "nose" where a magnetometer is known to be fitted
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
+    _default: ClassVar[ApDcmParams] = ApDcmParams()
+
+    def __init__(self, params: ApDcmParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or self._default
+        if self.params.use_magnetometer:
+            self.heading_reference = "nose"
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
+
+        Without a sample, or where it is not of something at rest: offset zero, level, as the original began.
+        """
+        s = self._state[0]
+        self._state.fill(0)
+        for f in _SETTINGS:
+            s[f.name] = getattr(self.params, f.name)
+        write_calibration(self._state, self.params.calibration)
+        use = self.params.use_magnetometer
+        s["use_magnetometer"] = use is None or bool(use)
+        for quirk in self.params.quirks:
+            s[Quirk(quirk).value] = 1
+        s["R_eb"] = s["R_euler_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+        s["fix_age_s"] = s["field_age_s"] = s["air_age_s"] = math.inf
+        s["wind_s"] = s["compass_yaw_s"] = s["course_yaw_s"] = -math.inf
+
+
+class ApDcm2013(ApDcm):
+    """The original of 12 July 2013: `ApDcm` with all quirks."""
+
+    _default = ApDcmParams(quirks=JULY_2013)

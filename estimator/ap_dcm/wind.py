@@ -1,0 +1,63 @@
+"""The wind estimate of `estimator.ap_dcm`, which ArduPilot took from MatrixPilot.
+
+References
+----------
+ArduPilot, libraries/AP_AHRS/AP_AHRS_DCM, revision 279f6d00 of 10 July 2013.
+"""
+
+import numpy as np
+
+from estimator.compiler.jit import kernel
+
+AIR_LIFE_S = 1.0  # an older airspeed is none
+WIND_RESTART_S, WIND_STRAIGHT_S = 10.0, 2.0
+WIND_TURN, WIND_JUMP_M_S = 0.2, 20.0  # least change of the nose, and largest step believed
+
+
+@kernel
+def learn_wind(s):  # type: ignore[no-untyped-def]
+    """Learn the wind from the change of velocity that goes with a change of the nose, or straight from airspeed.
+
+    Through still air a turn takes the velocity V f to V f_last: V and the wind are what two such velocities share.
+    """
+    v, f, v0, f0, wind = s.v_e_m_s, s.R_eb[:, 0], s.v_wind_e_m_s, s.nose_last, s.wind_e_m_s
+    since_s = s.clock_s - s.wind_s
+    turned = np.sqrt((f[0] - f0[0]) ** 2 + (f[1] - f0[1]) ** 2 + (f[2] - f0[2]) ** 2)
+    if since_s > WIND_RESTART_S:
+        remember_nose(s)
+    elif turned > WIND_TURN:
+        airspeed = np.sqrt((v[0] - v0[0]) ** 2 + (v[1] - v0[1]) ** 2 + (v[2] - v0[2]) ** 2) / turned
+        angle = np.arctan2(v[1] - v0[1], v[0] - v0[0]) - np.arctan2(f[1] - f0[1], f[0] - f0[0])
+        if s.overwritten_wind:
+            remember_nose(s)
+        c, z = airspeed * np.cos(angle), airspeed * np.sin(angle)
+        fx, fy, fz = f[0] + f0[0], f[1] + f0[1], f[2] + f0[2]
+        x = 0.5 * (v[0] + v0[0] - (c * fx - z * fy))
+        y = 0.5 * (v[1] + v0[1] - (z * fx + c * fy))
+        down = 0.5 * (v[2] + v0[2] - airspeed * fz)
+        known = np.sqrt(wind[0] * wind[0] + wind[1] * wind[1] + wind[2] * wind[2])
+        if np.sqrt(x * x + y * y + down * down) < known + WIND_JUMP_M_S:
+            blend_wind(s, 0.05, x, y, down)
+        remember_nose(s)
+    elif since_s > WIND_STRAIGHT_S and s.air_age_s <= AIR_LIFE_S:
+        a = s.airspeed_m_s
+        blend_wind(s, 0.08, v[0] - a * f[0], v[1] - a * f[1], v[2] - a * f[2])
+
+
+@kernel
+def remember_nose(s):  # type: ignore[no-untyped-def]
+    """Keep the nose and the velocity of now for the next wind estimate."""
+    s.wind_s = s.clock_s
+    for i in range(3):
+        s.nose_last[i] = s.R_eb[i, 0]
+        s.v_wind_e_m_s[i] = s.v_e_m_s[i]
+
+
+@kernel
+def blend_wind(s, share, x, y, z):  # type: ignore[no-untyped-def]
+    """Move the wind estimate by `share` towards the one just measured."""
+    wind = s.wind_e_m_s
+    wind[0] += share * (x - wind[0])
+    wind[1] += share * (y - wind[1])
+    wind[2] += share * (z - wind[2])
+    s.wind_known = 1

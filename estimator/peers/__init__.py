@@ -1,0 +1,1 @@
+"""Attitude estimators of other packages, flown for comparison: Madgwick, Mahony, VQF and imufusion."""

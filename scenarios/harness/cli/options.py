@@ -1,0 +1,206 @@
+"""The options that several commands take, and what they change in the configuration of a flight."""
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scenarios.harness.cli import values as complete
+from scenarios.harness.cli.reports import refusal
+from scenarios.harness.cli.values import number_in, whole_in
+from sim.outside.wording import brief
+
+# Each takes a few hundred megabytes; more of them than processors only wait for one another.
+MOST_WORKERS = max(64, 4 * (os.cpu_count() or 1))
+
+ScenarioArgument = Annotated[
+    str,
+    typer.Argument(help="Name of a scenario, or file.py with one's own.", autocompletion=complete.scenarios),
+]
+EstimatorOption = Annotated[
+    str | None,
+    typer.Option(
+        "--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.",
+        autocompletion=complete.estimators,
+    ),
+]  # fmt: skip
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
+]
+WindOption = Annotated[
+    str | None,
+    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, 5@head, calm."),
+]
+ShearOption = Annotated[
+    str | None,
+    typer.Option("--shear", metavar="EXP", help="Growth of the wind with height: 0 none, 0.14 open country."),
+]
+GustOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; repeat it."
+    ),
+]
+TurbulenceOption = Annotated[
+    str | None,
+    typer.Option("--turbulence", metavar="W20", help="calm, light, moderate, severe, or the wind at 20 ft, m/s."),
+]
+ThermalsOption = Annotated[
+    str | None, typer.Option("--thermals", metavar="N", help="Thermals around the launch point.")
+]
+AircraftOption = Annotated[
+    str | None, typer.Option("--aircraft", help="Name of an aircraft.", autocompletion=complete.aircraft)
+]
+AutopilotOption = Annotated[
+    str | None,
+    typer.Option(
+        "--autopilot", help="Registered name, module:Class or file.py:Class.", autocompletion=complete.autopilots
+    ),
+]
+GpsRateOption = Annotated[
+    float | None,
+    typer.Option(
+        "--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.",
+        parser=number_in(-1e6, 1e6, "Hz"),
+    ),
+]  # fmt: skip
+ImuRateOption = Annotated[
+    int | None,
+    typer.Option(
+        "--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.", parser=whole_in(-1000000, 1000000, "Hz")
+    ),
+]
+SensorsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.", autocompletion=complete.suites
+    ),
+]
+FaultOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fault",
+        metavar="FAULT",
+        help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
+        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
+        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
+        "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
+        "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
+    ),
+]
+JsonOption = Annotated[
+    str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
+]
+WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
+WorkersOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Processes; as many as processors by default.", parser=whole_in(1, MOST_WORKERS)),
+]
+FlightTimeoutOption = Annotated[
+    float | None,
+    typer.Option(
+        "--flight-timeout",
+        metavar="S",
+        help="Wall-clock limit of each flight. [default: 600]",
+        parser=number_in(0.001, 1e6, "s"),
+    ),
+]
+LedgerOption = Annotated[
+    Path | None,
+    typer.Option("--ledger", metavar="FOLDER", help="Keep each verdict there as it comes, and fly what is missing."),
+]
+FLIGHT_TIMEOUT_S = 600.0
+MarkdownOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")]
+CalibrationOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="S",
+        help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]",
+        parser=number_in(-1e6, 1e6, "s"),
+    ),
+]
+ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")]
+ReferenceOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
+]
+UnitOption = Annotated[
+    int | None,
+    typer.Option(
+        "--imu", metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0.", parser=whole_in(0, 99)
+    ),
+]
+SeveralOption = Annotated[
+    str | None,
+    typer.Option(
+        "--estimators", metavar="A,B,C", help="What flies it; all there are by default.",
+        autocompletion=complete.estimators,
+    ),
+]  # fmt: skip
+ParameterOption = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+]
+LogEstimatorsOption = Annotated[
+    str,
+    typer.Option(
+        "--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.",
+        autocompletion=complete.estimators,
+    ),
+]  # fmt: skip
+
+
+WithholdOption = Annotated[
+    str | None,
+    typer.Option(
+        "--withhold",
+        metavar="NAME,...",
+        help="Properties of the instruments that nobody is given; all for all of them.",
+    ),
+]
+
+
+def time_limit(flight_timeout: float | None, *, live: bool = False) -> float | None:
+    """What ``--flight-timeout`` says; where it says nothing, none for a flight that is watched as it is flown."""
+    return flight_timeout if flight_timeout is not None or live else FLIGHT_TIMEOUT_S
+
+
+def changes_of(assignments: list[str] | None) -> dict[str, Any]:
+    """Overrides of ``--set name=value``."""
+    changes = {}
+    for text in assignments or []:
+        name, equals, value = text.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise refusal(f"--set {brief(text)}: write name=value, for instance gps.latency_s=0.5")
+        changes[name.strip()] = value.strip()
+    return changes
+
+
+def fitted(
+    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None,
+    faults: list[str] | None,
+) -> dict[str, Any]:  # fmt: skip
+    """What flies, what it carries and what of that fails, by the names of the configuration."""
+    named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
+    return given(named | {"suite": suite, "faults": faults or None})
+
+
+def given(named: dict[str, Any]) -> dict[str, Any]:
+    """Those of `named` that were given on the command line."""
+    return {name: value for name, value in named.items() if value is not None}
+
+
+def air(
+    wind: str | None, shear: str | None, gust: list[str] | None, turbulence: str | None, thermals: str | None
+) -> dict[str, Any]:
+    """Overrides of the options about the air."""
+    named = {"wind": wind, "air.shear": shear, "air.gusts": gust or None}
+    return given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
+
+
+def names_of(text: str | None, option: str) -> list[str]:
+    """Names of a list with commas, none where the option was not given; refused where one of them is empty."""
+    names = [name.strip() for name in text.split(",")] if text is not None else []
+    if not all(names):
+        raise refusal(f"{option} {brief(text)}: an empty name; write names with commas between them")
+    return names

@@ -1,0 +1,281 @@
+"""Speed: the closed loop against bare JSBSim, stage by stage, and the estimator alone.
+
+The closed loop is `sim.loop.fly` itself in still air, timed from simulated second to simulated second, so that what
+happens once (trim, drawing the noise) is left out and what happens every tick is not.  Bare is the same plant object,
+in the same state, running the same physics with its commands left as they are.  The two alternate in one process;
+the ratio of the two minima is the figure, the median over the pairs shows how quiet the machine was.
+"""
+
+import platform
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter_ns
+from typing import Any
+
+from rich.text import Text
+
+from autopilot.interface import NEUTRAL, Autopilot, Mode, Setpoint
+from autopilot.pilot import Script, Timed
+from estimator.instruments import Instruments
+from estimator.interface import AttitudeEstimator, Measurements
+from scenarios.harness.checks import Row
+from scenarios.harness.cli import console
+from scenarios.harness.fitted import suite_params
+from scenarios.harness.gate import guard
+from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
+from scenarios.harness.verdict import FAILED, SIMULATION_FAILED
+from sim.aeroplane.jsbsim_plant import JsbsimPlant
+from sim.clock import Rates
+from sim.flight_code import FlightCodeFailed, blaming, command_of, estimate_of
+from sim.log import Flight, Log, Outcome
+from sim.loop import fly, make_ready, power_up
+from sim.plant import InFlight
+from sim.sensors.known import data_sheets
+from sim.sensors.suite import Suite
+
+RATIO_LIMIT = 1.6
+KERNEL_LIMIT_NS, UPDATE_LIMIT_NS = 1000.0, 3000.0
+STAGES = ("physics and truth", "sensors", "estimator", "autopilot")
+_NS_PER_US = 1e3
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """What was measured.
+
+    bare_us, closed_us : per tick, least of the repeats           median_ratio : over the pairs
+    stages_us : per tick, by stage, recording included            update_ns : the estimator's `update`, per call
+    kernel_ns : its kernel over a whole log in one call, per tick; None where it has none (no `replay`)
+    """
+
+    estimator: str
+    n_ticks: int
+    repeats: int
+    bare_us: float
+    closed_us: float
+    median_ratio: float
+    stages_us: dict[str, float]
+    update_ns: float
+    kernel_ns: float | None
+
+    @property
+    def ratio(self) -> float:
+        """Closed loop over bare."""
+        return self.closed_us / self.bare_us
+
+    @property
+    def rows(self) -> list[Row]:
+        """What is demanded, with its limit."""
+        rows = [
+            _limited("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
+            _limited(f"{self.estimator}: update()", "ns", self.update_ns, UPDATE_LIMIT_NS),
+        ]
+        if self.kernel_ns is not None:
+            rows.append(_limited(f"{self.estimator}: kernel", "ns", self.kernel_ns, KERNEL_LIMIT_NS))
+        return rows
+
+    @property
+    def passed(self) -> bool:
+        """Whether all of it is fast enough."""
+        return all(row.passed for row in self.rows)
+
+    def to_json(self) -> dict[str, Any]:
+        """The figures by name, each with its unit in it."""
+        return {
+            "passed": self.passed,
+            "closed_loop_ratio": self.ratio,
+            "closed_loop_ratio_median": self.median_ratio,
+            "bare_us_per_tick": self.bare_us,
+            "closed_loop_us_per_tick": self.closed_us,
+            "stages_us_per_tick": self.stages_us,
+            "estimator": self.estimator,
+            "estimator_ns_per_call": self.kernel_ns,
+            "estimator_update_ns": self.update_ns,
+            "ticks": self.n_ticks,
+            "repeats": self.repeats,
+            "python": platform.python_version(),
+            "machine": platform.machine(),
+        }
+
+
+def _limited(name: str, unit: str, value: float, limit: float) -> Row:
+    return Row(name, unit, value, "<=", limit, value <= limit)
+
+
+class NotTimed(RuntimeError):
+    """A flight that did not last, or flight code that failed while it was timed; `exit_code` as for a flight."""
+
+    def __init__(self, why: str, exit_code: int = FAILED) -> None:
+        super().__init__(why)
+        self.exit_code = exit_code
+
+
+_BENCHMARK = "the benchmark"
+
+
+class Cruise:
+    """A flight straight ahead in still air, that can be flown again and again."""
+
+    def __init__(self, estimator: str, duration_s: float) -> None:
+        rates = Rates()
+        self.dt_s = rates.dt_s
+        self.second = round(1.0 / rates.dt_s)
+        self.log = Log.empty(rates.ticks(duration_s))
+        self.plant = JsbsimPlant(start=InFlight(heading_rad=0.0), rates=rates)
+        suite = suite_params("generic", {})
+        self.suite = Suite(suite, rates, seed=0)
+        self.instruments = Instruments(data_sheets(suite, rates))
+        self.spec = estimator
+        self.setpoint = Setpoint(Mode.COURSE, course_rad=0.0, height_m=60.0)
+
+    def pilots(self) -> tuple[AttitudeEstimator, Autopilot]:
+        """A new estimator and a new autopilot, switched on."""
+        estimator = equipped(self.spec, self.instruments).code
+        autopilot = equipped_autopilot("dcm", heading_reference_of(estimator), "endurance", self.instruments).code
+        make_ready(estimator, autopilot, self.log)
+        power_up(estimator, None)
+        return estimator, autopilot
+
+    def closed_us(self) -> float:
+        """The closed loop, microseconds a tick."""
+        marks: list[tuple[int, int]] = []
+
+        def watch(log: Log, n_rows: int) -> None:  # noqa: ARG001 - as the loop calls it
+            marks.append((n_rows, perf_counter_ns()))
+
+        self.whole(
+            fly(self.plant, self.suite, *self.pilots(), Script([Timed(0.0, self.setpoint)]), self.log, watch=watch)
+        )
+        (first, begin_ns), (last, end_ns) = marks[0], marks[-1]
+        return (end_ns - begin_ns) / (last - first) / _NS_PER_US
+
+    def whole(self, flight: Flight) -> None:
+        """Refuse to time what did not fly to its end."""
+        if flight.outcome == Outcome.INTERRUPTED:
+            raise KeyboardInterrupt
+        if flight.outcome != Outcome.COMPLETED:
+            code = SIMULATION_FAILED if flight.outcome == Outcome.DIVERGED else FAILED
+            why = flight.message or flight.outcome.replace("_", " ")
+            raise NotTimed(f"the benchmark's flight did not last: {why}", code)
+
+    def bare_us(self) -> float:
+        """The physics alone, microseconds a tick, from the same start; its first second is left out too."""
+        self.plant.reset(self.log)
+        self.plant.run_bare(self.second)
+        n_ticks = len(self.log) - self.second
+        begin_ns = perf_counter_ns()
+        self.plant.run_bare(n_ticks)
+        return (perf_counter_ns() - begin_ns) / n_ticks / _NS_PER_US
+
+    def stages_us(self) -> dict[str, float]:
+        """The stages of one flight, microseconds a tick, clock readings taken off."""
+        estimator, autopilot = self.pilots()
+        self.plant.reset(self.log)
+        self.suite.reset(self.log)
+        total, command, clock = [0] * len(STAGES), NEUTRAL, perf_counter_ns
+        for k in range(len(self.log)):
+            t0 = clock()
+            self.plant.advance(k, command)
+            t1 = clock()
+            measured = self.suite.measure(k)
+            t2 = clock()
+            estimate = estimate_of(estimator, measured, self.log.flown, k)
+            t3 = clock()
+            command = command_of(autopilot, estimate, measured, self.setpoint, self.log.flown, k)
+            for i, spent in enumerate((t1 - t0, t2 - t1, t3 - t2, clock() - t3)):
+                total[i] += spent
+        per_reading = _least_ns(lambda: [clock() for _ in range(1000)]) / 1000
+        return {
+            stage: (spent / len(self.log) - per_reading) / _NS_PER_US
+            for stage, spent in zip(STAGES, total, strict=True)
+        }
+
+    def update_ns(self) -> float:
+        """`update` over the measurements of the last flight, nanoseconds a call."""
+        estimator, _ = self.pilots()
+        rows = self.log.measured.copy()
+        inputs = [Measurements(rows, k) for k in range(len(rows))]
+
+        def run() -> None:
+            update = estimator.update
+            for m in inputs:
+                update(m)
+
+        with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
+            return _least_ns(run) / len(inputs)
+
+    def kernel_ns(self) -> float | None:
+        """The kernel over the same measurements in one call, nanoseconds a tick; None where there is none."""
+        estimator, _ = self.pilots()
+        rows = self.log.measured.copy()
+        with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
+            replay = getattr(estimator, "replay", None)
+            return None if replay is None else _least_ns(lambda: replay(rows)) / len(rows)
+
+
+def _least_ns(run: Callable[[], Any], repeats: int = 7) -> float:
+    """Least time of several calls, after one that does not count."""
+    run()
+    times = []
+    for _ in range(repeats):
+        begin_ns = perf_counter_ns()
+        run()
+        times.append(perf_counter_ns() - begin_ns)
+    return float(min(times))
+
+
+def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
+    """Measure with `estimator` aboard: `repeats` pairs of `seconds` of simulated flight.
+
+    Raises
+    ------
+    ValueError      no such estimator      NotTimed    one that fails, or does not keep the aeroplane in the air
+    """
+    equipped(estimator)  # refused before anything is timed
+    if _BENCHMARK in guard.lost:
+        raise NotTimed(f"the benchmark's flight did not last: the process {guard.lost[_BENCHMARK].message}")
+    try:
+        with guard.watched(_BENCHMARK):
+            return _measured(estimator, seconds, repeats, advance)
+    except FlightCodeFailed as failure:
+        raise NotTimed(str(failure)) from failure
+
+
+def _measured(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
+    cruise = Cruise(estimator, seconds)
+    cruise.closed_us()  # compiles, and warms up
+    cruise.bare_us()
+    closed, bare = [], []
+    for i in range(repeats):
+        closed.append(cruise.closed_us())
+        bare.append(cruise.bare_us())
+        advance(i + 1, repeats)
+    by_repeat = [cruise.stages_us() for _ in range(max(3, repeats // 4))]
+    return Speed(
+        estimator=estimator,
+        n_ticks=len(cruise.log),
+        repeats=repeats,
+        bare_us=min(bare),
+        closed_us=min(closed),
+        median_ratio=statistics.median(c / b for c, b in zip(closed, bare, strict=True)),
+        stages_us={stage: min(stages[stage] for stages in by_repeat) for stage in STAGES},
+        update_ns=cruise.update_ns(),
+        kernel_ns=cruise.kernel_ns(),
+    )
+
+
+def tell(speed: Speed) -> None:
+    """The figures, and where the time goes."""
+    out = console.out()
+    out.print(console.verdict_table("speed in still air", speed.rows))
+    parts = {"bare JSBSim": speed.bare_us, "closed loop": speed.closed_us} | {
+        f"  {stage}": us for stage, us in speed.stages_us.items()
+    }
+    out.print(console.figure_table("where the time goes", parts, "us per tick"))
+    out.print(
+        Text(
+            f"{speed.repeats} pairs of {speed.n_ticks} ticks; median ratio of the pairs {speed.median_ratio:.2f} "
+            f"(least over least {speed.ratio:.2f})"
+        )
+    )

@@ -1,0 +1,195 @@
+"""Many flights judged: every scenario on every seed, over several processes, the same whatever their number.
+
+A flight is decided by its scenario, its overrides and its seed alone, and the verdicts are put together in the order
+in which the flights were named, so neither the number of workers nor their speed shows in the result.
+"""
+
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from scenarios.harness.cli import console
+from scenarios.harness.cli import reports as cli_reports
+from scenarios.harness.config import LARGEST_SEED
+from scenarios.harness.flight import fly_scenario
+from scenarios.harness.gate.ledger import Ledger
+from scenarios.harness.gate.sources import decided_by, fingerprint
+from scenarios.harness.gate.workers import fly_each
+from scenarios.harness.preflight import prepared
+from scenarios.harness.registry import find, matching
+from scenarios.harness.verdict import FlightVerdict, Verdict, judge
+from sim import recording
+from sim.log import Outcome
+
+MOST_SEEDS, MOST_FLIGHTS = 10_000, 100_000  # of one command
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One flight to be flown, by names, so that it can be sent to a process."""
+
+    scenario: str
+    seed: int
+    estimator: str
+    overrides: Mapping[str, Any]
+    name: str  # of the scenario, which may be named by its file
+    key: str = ""  # fingerprint of all that decides it, where there is a ledger
+
+    def fly(self) -> FlightVerdict:
+        """Fly it and judge it."""
+        began_s, scenario = time.monotonic(), find(self.scenario)
+        flight = fly_scenario(scenario, self.overrides, seed=self.seed, estimator=self.estimator, kept=True)
+        return replace(judge(scenario, flight), wall_s=time.monotonic() - began_s)
+
+    def lost(self, outcome: Outcome, message: str) -> FlightVerdict:
+        """The verdict where nothing came back."""
+        return FlightVerdict(self.name, self.estimator, self.seed, outcome, (), {}, message)
+
+
+def tasks(
+    names: Sequence[str],
+    seeds: Sequence[int],
+    estimator: str | None,
+    changes: Mapping[str, Any],
+    *,
+    keyed: bool = False,
+) -> list[Task]:
+    """Every scenario of `names` (all there are, where it is empty) on every seed.
+
+    With an estimator of one's own, those that pass where their own estimator fails are left out, unless named in full.
+
+    keyed : with the fingerprint of what decides each, for a ledger
+
+    Raises
+    ------
+    ValueError      one line: what cannot be flown, before anything is
+    """
+    wanted, left_out = matching(names or ["*"]), []
+    if estimator is not None:
+        left_out = [name for name in wanted if name not in names and find(name).shows_failure]
+        wanted = [name for name in wanted if name not in left_out]
+        if not wanted:
+            raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
+    if len(wanted) * len(seeds) > MOST_FLIGHTS:
+        raise ValueError(
+            f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
+        )
+    all_changes = changes if estimator is None else {**changes, "estimator": estimator}
+    configs = [prepared(name, all_changes) for name in wanted]  # all of them, before anything is said
+    found = []
+    for name, (scenario, config) in zip(wanted, configs, strict=True):
+        console.warn_of_faults(name, config)
+        decides = decided_by(name, config) | {"changes": recording.plain(changes)} if keyed else {}
+        for seed in seeds:
+            key = fingerprint(decides | {"seed": seed}) if keyed else ""
+            found.append(Task(name, seed, config.estimator, changes, scenario.name, key))
+    console.note_left_out(left_out)
+    return found
+
+
+def tell(verdict: Verdict) -> None:
+    """The pooled tables, then the flights that failed, each on a line."""
+    out = console.out()
+    for pool in verdict.pooled:
+        out.print(console.verdict_table(f"{pool.scenario}, {pool.estimator}, {pool.n_flights} flights", pool.rows))
+    for flight in verdict.flights:
+        if not flight.passed:
+            failed = ", ".join(
+                f"{row.name} {console.number(row.measured)} {row.unit}".rstrip()
+                for row in flight.rows
+                if not row.passed
+            )
+            why = flight.ending if flight.message or flight.broken else failed
+            console.line(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red")
+    flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))
+    missing = f"; {verdict.missing_text}" if verdict.missing else ""
+    console.last(f"passed: {flights} flights, {pooled} scenarios pooled{missing}")
+
+
+def parse_seeds(text: str) -> list[int]:
+    """Seeds of what a person types: ``0-9``, ``3``, ``0,2,5-7``; each once, in that order.
+
+    Raises
+    ------
+    ValueError      naming what would be right
+    """
+    right = "write numbers and ranges, for instance 0-9 or 0,2,5-7"
+    seeds: dict[int, None] = {}
+    for part in text.split(","):
+        found = re.fullmatch(r" *([0-9]{1,20})(?:-([0-9]{1,20}))? *", part)
+        if not found:
+            raise ValueError(f"seeds = {text!r}: {right}")
+        first, last = int(found[1]), int(found[2] or found[1])
+        if not first <= last <= LARGEST_SEED:
+            raise ValueError(f"seeds = {text!r}: {part.strip()} is no range of seeds from 0 to {LARGEST_SEED}; {right}")
+        if last - first + len(seeds) >= MOST_SEEDS:
+            raise ValueError(f"seeds = {text!r}: more than {MOST_SEEDS} at once are too many; split them")
+        seeds |= dict.fromkeys(range(first, last + 1))
+    return list(seeds)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """The result of a check.
+
+    flown, resumed : flights that were flown now, and that the ledger held      missing : that were not finished
+    """
+
+    verdict: Verdict
+    flown: int
+    resumed: int
+    missing: int
+    wall_s: float
+
+    @property
+    def exit_code(self) -> int:
+        """As of the command line."""
+        return console.INTERRUPTED if self.missing else self.verdict.exit_code
+
+    def to_json(self) -> dict[str, Any]:
+        """The verdict, and under ``run`` all that another run of the same command may tell otherwise."""
+        flights = [{"scenario": v.scenario, "seed": v.seed, "wall_s": v.wall_s} for v in self.verdict.flights]
+        run = {"flown": self.flown, "resumed": self.resumed, "wall_s": self.wall_s, "flights": flights}
+        return self.verdict.to_json() | {"run": run}
+
+
+def fly_all(
+    tasks: Sequence[Task],
+    workers: int,
+    advance: Callable[[int, int], None],
+    *,
+    limit_s: float | None = None,
+    ledger: Ledger | None = None,
+) -> Run:
+    """Fly and judge all `tasks`, but for those whose verdict `ledger` holds, and keep there what is flown.
+
+    limit_s : wall-clock limit of each flight       advance : called with the number done and the total
+
+    The verdict is on the flights that were finished: Ctrl-C leaves some out.
+    """
+    began_s = time.monotonic()
+    kept = {i: ledger.find(task.key, task.name, task.seed) for i, task in enumerate(tasks)} if ledger else {}
+    done = {i: verdict for i, verdict in kept.items() if verdict is not None}
+    missing = [i for i in range(len(tasks)) if i not in done]
+
+    def keep(k: int, verdict: FlightVerdict) -> None:
+        if ledger is None:
+            return
+        cli_reports.come_home()
+        with cli_reports.attempt():  # a full disk costs the ledger its file, and no flight
+            ledger.keep(tasks[missing[k]].key, verdict)
+
+    flown = fly_each(
+        [tasks[i] for i in missing],
+        workers,
+        lambda n, _total: advance(len(tasks) - len(missing) + n, len(tasks)),
+        limit_s=limit_s,
+        interrupted=lambda verdict: verdict.outcome == Outcome.INTERRUPTED,
+        keep=keep,
+    )
+    resumed = len(done)
+    done |= {missing[k]: verdict for k, verdict in flown.items()}
+    verdict = Verdict.of(((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(tasks) - len(done))
+    return Run(verdict, len(flown), resumed, len(tasks) - len(done), time.monotonic() - began_s)

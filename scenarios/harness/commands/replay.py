@@ -1,0 +1,186 @@
+"""`wingslevel replay`: a log read, replayed by one estimator or several, recorded and told."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimator.instruments import Instruments, property_names, to_json
+from scenarios.harness import logs
+from scenarios.harness.cli import console
+from scenarios.harness.gate import guard
+from scenarios.harness.logs.recorded import RecordedLog
+from scenarios.harness.plugins import shared_settings, without
+from scenarios.harness.recorder import record
+from scenarios.harness.replay import Replayed, Window, as_flight, gone, judged_rows, known_to, make, replay, why_none
+from sim import recording
+from sim.outside.wording import file_name
+
+_HEADINGS = ("", "inclination\n   RMS    p95    max", "heading\nRMS", "rotation\n   RMS    max", "ns per\nupdate")
+_SHOWN = (
+    ("inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg"),
+    ("heading_rms_deg",),
+    ("rotation_rms_deg", "rotation_max_deg"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A log and what the estimators made of it.
+
+    folders : their recordings, by name, None where one could not be written
+    not_judged : why nothing was judged, empty where something was
+    notes : what was set for some of the estimators alone, a line each
+    """
+
+    log: RecordedLog
+    judged_s: float
+    replays: tuple[Replayed, ...]
+    folders: Mapping[str, Path | None]
+    not_judged: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def exit_code(self) -> int:
+        """1 where an estimator failed, or nothing of the reference could be judged."""
+        nothing = self.log.reference is not None and self.not_judged
+        return 1 if nothing or any(r.failure for r in self.replays) else 0
+
+    def to_json(self) -> dict[str, Any]:
+        """Every number by its estimator; with one estimator at the top too."""
+        rows = self.log.rows
+        about = {
+            "log": self.log.name,
+            "rows": len(rows),
+            "length_s": float(rows["t_s"][-1] - rows["t_s"][0] + rows["dt_s"][0]),
+            "instruments": list(self.log.instruments),
+            "reference": self.log.reference.name if self.log.reference else None,
+            "reference_kind": self.log.reference.kind if self.log.reference else None,
+            "repairs": list(self.log.repairs),
+            "known": to_json(Instruments(self.log.known)),
+            "ledger": self.log.ledger.to_json(),
+            "judged_s": self.judged_s,
+            "not_judged": self.not_judged or None,
+            "notes": [*self.log.notes, *self.notes],
+        }
+        each = {r.estimator: r.to_json() | {"recording": _place(self.folders[r.estimator])} for r in self.replays}
+        alone = next(iter(each.values())) if len(each) == 1 else {}
+        return {**about, "estimators": each, **alone}
+
+
+def run(
+    path: Path,
+    names: Sequence[str],
+    into: Path,
+    *,
+    reference: Path | None = None,
+    columns: str | None = None,
+    imu: int | None = None,
+    params: Mapping[str, Any] | None = None,
+    withheld: Sequence[str] = (),
+    window: Window | None = None,
+    rerun: bool = True,
+) -> Told:
+    """Read the log at `path`, replay it with each estimator of `names`, record each below the folder `into`.
+
+    params : of all that have them, or, as ``premerlani.gps_latency_s``, of one
+    withheld : properties of the instruments that no estimator is given; ``all`` are all of them
+
+    Raises
+    ------
+    ValueError      one line: log, reference, map, estimator, parameter or folder; nothing has been written then
+    """
+    window, params = window or Window(), params or {}
+    if not names or len({name.rpartition(":")[2] for name in names}) < len(names):
+        raise ValueError(f"--estimator {','.join(names)}: name at least one, name each one once")
+    settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
+    of_each, withheld = shared_settings(names, settings), property_names(withheld)
+    for name in names:
+        make(name, of_each[name])
+    recording.check_writable(into)
+    log = logs.read(path, reference=reference, columns=columns, imu=imu)
+    for name in names:  # again with what the log tells: all are made before any is run
+        make(name, of_each[name], known_to(log, withheld))
+    replays: list[Replayed] = []
+    folders: dict[str, Path | None] = {}
+    for name in names:
+        watched = f"estimator {name}"
+        if watched in guard.lost:  # and with it the process in which all are replayed
+            replays.append(gone(name, f"the process {guard.lost[watched].message}"))
+            continue
+        with console.progress(f"replaying {name}", "") as advance, guard.watched(watched):
+            replays.append(replay(log, name, of_each[name], window, withheld, advance))
+    stem = log.name.partition(".")[0]
+    for replayed in replays:
+        if not len(replayed.log):
+            folders[replayed.estimator] = None
+            continue
+        flight = as_flight(log, replayed, window)
+        with console.progress(f"recording {replayed.estimator}", "") as _:
+            name = f"replay_{file_name(stem)}-{file_name(replayed.estimator)}"
+            folder = record(flight, into, name, rerun=rerun)
+        folders[replayed.estimator] = folder
+    first = replays[0].first
+    judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
+    notes = (*without(of_each, settings), *_ground_too(log))
+    return Told(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
+
+
+def _place(folder: Path | None) -> str | None:
+    return None if folder is None else str(folder)
+
+
+def _ground_too(log: RecordedLog) -> list[str]:
+    """A line where the log has fixes and none of them is usable: nothing then tells flight from ground."""
+    fixes = log.ledger.get("gps")
+    if fixes is None or not fixes.read or fixes.used:
+        return []
+    return ["none of the fixes is usable: all rows are judged, those on the ground too"]
+
+
+def tell(told: Told) -> None:
+    """The log, what was repaired in it, the table, and where the recordings are."""
+    out, log = console.out(), told.log
+    length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
+    console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}")
+    for line in log.notes:
+        console.line(f"note        {line}")
+    for line in log.repairs:
+        console.line(f"repaired    {line}", "yellow")
+    for line in told.notes:
+        console.line(f"note        {line}")
+    if len(log.ledger):
+        columns = ("", "read", "used", "left out")
+        out.print(console.table("samples in the log", columns, _books(log), text=(0, 3), wrapping=(3,)))
+    if log.reference is not None:
+        console.line(f"against     {log.reference.name}, {told.judged_s:.1f} s of it judged")
+    rows = [_row(replayed) for replayed in told.replays]
+    out.print(console.table("differences from the reference, degrees", _HEADINGS, rows, wrapping=(0,)))
+    console.print_known({replayed.estimator: replayed.known for replayed in told.replays})
+    for replayed in told.replays:
+        if replayed.refused:
+            refused = ", ".join(f"{n} {name}" for name, n in replayed.refused.items())
+            console.line(f"not believed by {replayed.estimator}: {refused} samples")
+        if replayed.failure:
+            console.line(f"{replayed.estimator} failed: {replayed.failure}", "bold red")
+    if told.not_judged:
+        style = "bold red" if log.reference is not None else "yellow"
+        console.line(f"nothing judged: {told.not_judged}", style)
+    for folder in filter(None, told.folders.values()):
+        console.line(f"recording   {folder}")
+
+
+def _books(log: RecordedLog) -> list[list[str]]:
+    """Lines of the ledger."""
+    return [
+        [stream, str(entry.read), str(entry.used), ", ".join(f"{n} {reason}" for reason, n in entry.left_out.items())]
+        for stream, entry in log.ledger.items()
+    ]
+
+
+def _row(replayed: Replayed) -> list[str]:
+    """A line of the table: numbers that belong together in one cell, so that it fits 80 columns."""
+    cells = [" ".join(f"{console.number(replayed.scores[name]):>6}" for name in names) for names in _SHOWN]
+    return [replayed.estimator, *cells, f"{replayed.ns_per_update:.0f}"]

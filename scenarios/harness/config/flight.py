@@ -1,0 +1,379 @@
+"""The configuration of one flight: what flies, where from, through what air, with which sensors, for how long.
+
+A configuration may leave things to chance (``"random"``).  `resolve` draws them once, each from its named stream,
+into plain numbers; the resolved configuration goes into the manifest, and the flight can be flown again from it.
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from estimator.instruments import PROPERTIES, property_names, property_value
+from estimator.interface import MEASURED_DTYPE
+from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios find it beside the rest
+from scenarios.harness.config.air import parse_wind, resolve_air
+from scenarios.harness.config.faults import require_faults_possible, typed_faults
+from scenarios.harness.config.validation import validated
+from scenarios.harness.fitted import suite_params
+from sim.clock import Rates
+from sim.log import FLOWN_DTYPE, TRUTH_DTYPE
+from sim.outside.numbers import RIGHT, is_odd, number
+from sim.outside.wording import brief, printable
+from sim.params import dotted_fields, near_misses, require_fitted, shown, unit_of
+from sim.rng import stream
+from sim.sensors.fitting import own_files
+
+MOST_BYTES = 2_000_000_000  # of a flight's log, which is held in memory
+ROW_BYTES = sum(dtype.itemsize for dtype in (TRUTH_DTYPE, MEASURED_DTYPE, FLOWN_DTYPE))
+SMALLEST, LARGEST = 1e-12, 1e9  # of a number that is no zero, in whatever unit
+LARGEST_SEED = 2**32 - 1
+
+Chance = Literal["random"]
+Triple = tuple[float, float, float]
+Figure = float | bool | str | tuple[float, ...]  # what a field of a sensor can be; the dataclass says which
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class RatesConfig(_Model):
+    """Rates in hertz; the slower ones divide the physics rate (`sim.clock.Rates`).
+
+    gps_hz : None is the rate of the receiver that is fitted; a resolved configuration holds the number
+    """
+
+    physics_hz: int = 200
+    imu_hz: int = 50
+    gps_hz: float | None = None
+
+    @model_validator(mode="after")
+    def _divide(self) -> "RatesConfig":
+        if self.gps_hz is None:
+            Rates(self.physics_hz, self.imu_hz)
+        else:
+            self.build()
+        return self
+
+    def build(self) -> Rates:
+        """The clock of these rates; ValueError where that of the GPS is still the receiver's own."""
+        if self.gps_hz is None:
+            raise ValueError("rates.gps_hz = None: resolve the configuration first")
+        return Rates(self.physics_hz, self.imu_hz, self.gps_hz)
+
+
+class InFlightStart(_Model):
+    """Start in trimmed level flight, `out_m` from the launch point in the direction of the heading."""
+
+    kind: Literal["in_flight"] = "in_flight"
+    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
+    height_m: float = Field(default=60.0, gt=0.0, le=3000.0)
+    out_m: float = Field(default=0.0, ge=0.0, le=5000.0)
+    airspeed_m_s: float | None = Field(default=None, gt=0.0)
+
+
+class HandMotion(_Model):
+    """How the hand moved: a_i sin(2 pi f_i t + phase_i) in rate about roll, pitch and yaw, and the twist it gave."""
+
+    sway_deg_s: Triple
+    sway_hz: Triple
+    sway_phase_deg: Triple
+    release_rate_deg_s: Triple
+
+
+class HandThrowStart(_Model):
+    """Start in a hand at the launch point, then thrown.
+
+    height_m : of the hand above the ground that is flown over: more than an arm's is a throw off a slope
+    sway_deg_s : largest rate of the hand about each axis     release_rate_deg_s : sigma of the twist, each axis
+    hand : "random" draws the motion from these two; a resolved configuration holds what was drawn
+    calibration_s : from power-up, over which the gyro offset is measured in the hand
+    """
+
+    kind: Literal["hand_throw"] = "hand_throw"
+    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
+    pitch_deg: float = Field(default=15.0, ge=-30.0, le=60.0)
+    height_m: float = Field(default=1.7, gt=0.0, le=300.0)
+    hold_s: float = Field(default=8.0, gt=0.0, le=600.0)
+    push_m_s2: float = Field(default=27.0, gt=0.0, le=100.0)
+    push_s: float = Field(default=0.3, gt=0.0, le=2.0)
+    sway_deg_s: float = Field(default=3.0, ge=0.0, le=60.0)
+    release_rate_deg_s: float = Field(default=15.0, ge=0.0, le=90.0)
+    calibration_s: float = Field(default=2.0, ge=0.0)
+    hand: HandMotion | Chance = "random"
+
+    @model_validator(mode="after")
+    def _calibrate_in_the_hand(self) -> "HandThrowStart":
+        if self.calibration_s > self.hold_s:
+            raise ValueError(
+                f"calibration_s = {self.calibration_s:g} s: at most hold_s, the {self.hold_s:g} s in the hand"
+            )
+        return self
+
+
+class BenchStart(_Model):
+    """At rest on a table indoors, and it stays there: no air moves, no motor runs, no command does anything.
+
+    height_m : of the table     calibration_s : from power-up, over which the gyro offset is measured; what is judged
+    begins after it
+    """
+
+    kind: Literal["bench"] = "bench"
+    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
+    roll_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
+    pitch_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
+    height_m: float = Field(default=0.8, ge=0.0, le=10.0)
+    calibration_s: float = Field(default=2.0, ge=0.0, le=600.0)
+
+
+AnyStart = InFlightStart | HandThrowStart | BenchStart
+
+
+class FlightConfig(_Model):
+    """Everything that decides a flight, beside the code.
+
+    estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
+    estimator_params : fields of the estimator's parameter dataclass
+    instruments : properties of the instruments that the user sets, ``{"gps_latency_s": 1.0}``: they go to every
+    estimator and autopilot that has a parameter of that name, instead of the figures of the suite
+    withheld : names of properties to hide from flight code, whatever the suite says
+    duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
+    changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
+    turn_table : the magnetometer was turned on a table before the flight: an estimator that has a parameter
+    ``calibration`` is given what that tells, see `compass`
+    files : path -> text of the files of one's own that the suite is made of; a resolved configuration holds them
+    manoeuvre : the scenario's own parameters
+    faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
+    box_radius_m, box_height_m : of the cylinder around the launch point; beyond it the flight is over
+    seed, flight : campaign and number of the flight in it, which name the random streams
+    """
+
+    aircraft: str = "endurance"
+    estimator: str = "premerlani"
+    estimator_params: dict[str, Any] = Field(default_factory=dict)
+    instruments: dict[str, float | bool] = Field(default_factory=dict)
+    withheld: tuple[str, ...] = ()
+    autopilot: str = "dcm"
+    duration_s: float = Field(default=60.0, gt=0.0, le=36000.0)
+    rates: RatesConfig = Field(default_factory=RatesConfig)
+    suite: str = "generic"
+    sensors: dict[str, Figure] = Field(default_factory=dict)
+    turn_table: bool = False
+    files: dict[str, str] = Field(default_factory=dict)
+    faults: tuple[str, ...] = ()
+    air: AirConfig = Field(default_factory=AirConfig)
+    start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
+    manoeuvre: dict[str, float] = Field(default_factory=dict)
+    box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
+    box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
+    seed: int = Field(default=0, ge=0, le=LARGEST_SEED)
+    flight: int = Field(default=0, ge=0, le=LARGEST_SEED)
+
+    @field_validator("faults", mode="before")
+    @classmethod
+    def _typed_faults(cls, faults: Any) -> Any:
+        return typed_faults(faults)
+
+    @field_validator("instruments", mode="before")
+    @classmethod
+    def _known_properties(cls, values: Any) -> Any:
+        return {name: property_value(name, value) for name, value in dict(values).items()}
+
+    @field_validator("withheld", mode="before")
+    @classmethod
+    def _names_of_properties(cls, names: Any) -> Any:
+        return property_names(names.split(",") if isinstance(names, str) else names)
+
+    @model_validator(mode="after")
+    def _calm_indoors(self) -> "FlightConfig":
+        if isinstance(self.start, BenchStart) and not self.air.calm:
+            raise ValueError("air: it rests on a table indoors, where no air moves; leave wind, gusts and the rest out")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_in_memory(self) -> "FlightConfig":
+        tick_s = 1.0 / self.rates.imu_hz
+        if self.duration_s < tick_s:
+            raise ValueError(f"duration_s = {self.duration_s!r} s: must be at least {tick_s:g} s, one tick of the loop")
+        most_s = MOST_BYTES / (ROW_BYTES * self.rates.imu_hz) - self.held_s
+        if self.duration_s > most_s:
+            raise ValueError(
+                f"duration_s = {self.duration_s:g} s: must be at most {max(most_s, 0.0):.0f} s at {self.rates.imu_hz} "
+                f"Hz, for the log is held in memory and may take {MOST_BYTES / 1e9:g} GB"
+            )
+        return self
+
+    @property
+    def heading_deg(self) -> float:
+        """Heading at the start; ValueError where it has not been drawn yet."""
+        heading_deg = self.start.heading_deg
+        if isinstance(heading_deg, str):
+            raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
+        return heading_deg
+
+    @property
+    def held_s(self) -> float:
+        """From power-up to the release; on a table, to the end of the calibration."""
+        match self.start:
+            case HandThrowStart(hold_s=hold_s, push_s=push_s):
+                return hold_s + push_s
+            case BenchStart(calibration_s=calibration_s):
+                return calibration_s
+        return 0.0
+
+    @property
+    def calibration_s(self) -> float:
+        """From power-up, over which the gyro offset is measured; 0 where the flight starts in the air."""
+        return 0.0 if isinstance(self.start, InFlightStart) else self.start.calibration_s
+
+
+def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig:
+    """`config` with fields changed by their dotted names; values may be text, as from a command line.
+
+    ``wind`` takes what `parse_wind` takes; ``gps.``, ``gyro.`` and ``accelerometer.`` are short for ``sensors.gps.``
+    and so on, and the name of a property of the instruments for ``instruments.`` and that name.
+
+    Raises
+    ------
+    ValueError      one line with the field, the value, its unit and what would be right
+    """
+    data = config.model_dump()
+    if "suite" in overrides:  # first, for its fields are named by other overrides; its files are read anew
+        data |= {"suite": str(overrides["suite"]), "files": {}}
+        config = config.model_copy(update={"suite": data["suite"], "files": {}})
+    for name, value in overrides.items():
+        if name == "wind":
+            wind = parse_wind(str(value))
+            data["air"] |= {"wind_m_s": wind.m_s, "wind_from_deg": wind.from_deg}
+        else:
+            full_name = _full_name(name, config)
+            _refuse_odd(full_name, value)
+            _put(data, full_name, value)
+    changed = validated(FlightConfig, data)
+    # Refuses a suite, a value or a fault that cannot be.
+    fitted = suite_params(changed.suite, changed.sensors, changed.files)
+    require_faults_possible(changed.faults, fitted)
+    if changed.turn_table and fitted.magnetometer is None:
+        raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
+    return changed
+
+
+_TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts")
+
+
+def _full_name(name: str, config: FlightConfig) -> str:
+    """Dotted name of a field that exists, or a ValueError with those that come near."""
+    fitted = suite_params(config.suite, {}, config.files)
+    fields = dotted_fields(fitted)
+    if name in fields:
+        return f"sensors.{name}"
+    if name in PROPERTIES:
+        return f"instruments.{name}"
+    open_ended = name.startswith("estimator_params.")  # the estimator's own dataclass checks these
+    properties = [f"instruments.{property_}" for property_ in PROPERTIES]
+    known = [*_dotted(config), *properties, *(f"sensors.{f}" for f in fields), "wind"]
+    if name not in known and not open_ended:
+        require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
+        raise ValueError(f"unknown parameter {brief(name)}: {near_misses(name, [*known, *fields])}")
+    return name
+
+
+def _dotted(config: FlightConfig) -> list[str]:
+    """Names of the fields that one may change."""
+    names: list[str] = []
+    for name, value in config:
+        if isinstance(value, BaseModel):
+            names += [f"{name}.{inner}" for inner in type(value).model_fields if inner != "kind"]
+        elif name == "manoeuvre":
+            names += [f"{name}.{inner}" for inner in value]
+        elif name not in ("sensors", "estimator_params", "instruments", "files"):
+            names.append(name)
+    return names
+
+
+def _refuse_odd(name: str, value: Any) -> None:
+    """Refuse text that only Python takes for a number, but where a text is meant: ValueError."""
+    if isinstance(value, str) and name not in _TEXTS and is_odd(value):
+        raise ValueError(f"{name} = {printable(value, 60)} {unit_of(name)}".rstrip() + f": {RIGHT}")
+
+
+def _put(data: dict[str, Any], name: str, value: Any) -> None:
+    """Set the field of dotted `name`; what follows ``sensors.`` is one key."""
+    head, _, rest = name.partition(".")
+    if not rest:
+        data[head] = value
+    elif head in ("estimator_params", "sensors"):
+        read = literal(value)
+        if not _is_sane(read):
+            raise ValueError(f"{shown(name, value)}: must be 0, or between {SMALLEST:g} and {LARGEST:g} in size")
+        data[head] = {**data[head], rest: read}
+    else:
+        data[head] = {**data[head], rest: value}
+
+
+def literal(value: Any) -> Any:
+    """Number, truth value or list that `value` spells, else the text itself."""
+    if not isinstance(value, str):
+        return value
+    for read in (json.loads, number):  # .5 is a number, but no JSON
+        try:
+            return read(value)
+        except (ValueError, RecursionError):
+            continue
+    return value
+
+
+def _is_sane(value: Any) -> bool:
+    """Whether all numbers in it are of a size that some quantity could have: NaN and infinity are not."""
+    if isinstance(value, list | tuple):
+        return all(map(_is_sane, value))
+    return not isinstance(value, int | float) or value == 0 or SMALLEST <= abs(value) <= LARGEST
+
+
+def resolve(config: FlightConfig) -> FlightConfig:
+    """`config` with all that was left open in numbers: chance drawn, each from its named stream; idempotent.
+
+    The rate of the GPS becomes the receiver's own, and the files of one's own sensors are kept.
+    """
+    start = _resolve_start(config)
+    air = resolve_air(config.air, start.heading_deg, config.seed, config.flight)
+    files = config.files or own_files(config.suite)
+    return config.model_copy(update={"start": start, "air": air, "files": files, "rates": _resolve_rates(config)})
+
+
+def _resolve_rates(config: FlightConfig) -> RatesConfig:
+    if config.rates.gps_hz is not None:
+        return config.rates
+    receiver = suite_params(config.suite, config.sensors, config.files).gps
+    rates = config.rates.model_copy(update={"gps_hz": receiver.rate_hz})
+    rates.build()  # refuses a receiver whose rate the physics cannot keep
+    return rates
+
+
+def _resolve_start(config: FlightConfig) -> Any:
+    start: AnyStart = config.start
+    if start.heading_deg == "random":
+        heading_deg = 360.0 * float(stream(config.seed, config.flight, "start_heading").random())
+        start = start.model_copy(update={"heading_deg": heading_deg})
+    if isinstance(start, HandThrowStart) and start.hand == "random":
+        start = start.model_copy(update={"hand": _draw_hand(config, start)})
+    return start
+
+
+def _draw_hand(config: FlightConfig, start: HandThrowStart) -> HandMotion:
+    """The hand sways as slowly as an arm does, 0.4 to 1.2 Hz; the twist is normal, cut off at two sigma."""
+    rng = stream(config.seed, config.flight, "hand")
+    sway = start.sway_deg_s * rng.uniform(0.5, 1.0, 3)
+    hz, phase = rng.uniform(0.4, 1.2, 3), rng.uniform(0.0, 360.0, 3)
+    twist = start.release_rate_deg_s * np.clip(rng.standard_normal(3), -2.0, 2.0)
+    return HandMotion(
+        sway_deg_s=_triple(sway), sway_hz=_triple(hz), sway_phase_deg=_triple(phase), release_rate_deg_s=_triple(twist)
+    )
+
+
+def _triple(values: np.ndarray) -> Triple:
+    x, y, z = (float(v) for v in values)
+    return x, y, z

@@ -1,0 +1,143 @@
+"""What decides a flight, as a fingerprint: its scenario, its configuration, all code that flies in it, the versions.
+
+Code of the project and code of others are read alike: the file that a name stands for, the other Python files of its
+folder (of its whole package, where it is one), and every module of others that these have imported so far.  Data files
+that flight code reads by itself are not seen.
+"""
+
+import hashlib
+import importlib.metadata
+import json
+import platform
+import sys
+import sysconfig
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from scenarios.harness.aboard import flight_code
+from scenarios.harness.config import FlightConfig
+from scenarios.harness.registry import find
+from sim.recording import versions
+
+_ROOT = Path(__file__).resolve().parents[3]
+_OURS = ("estimator", "autopilot", "sim", "scenarios")
+_KINDS = {".py", ".toml", ".xml"}
+_PEERS = ("scipy", "ahrs", "imufusion", "vqf")  # packages of others that our estimators fly with
+
+
+def decided_by(scenario: str, config: FlightConfig) -> dict[str, Any]:
+    """Everything that decides the flight of a scenario, by name or file, under the resolved `config`."""
+    code = flight_code(config)
+    return {
+        "scenario": find(scenario).name,
+        "scenario_file": _of_file(Path(scenario)) if scenario.endswith(".py") else "",
+        "config": config.model_dump(mode="json"),
+        "estimator": _of_code(config.estimator, type(code.estimator.code).__module__),
+        "autopilot": _of_code(config.autopilot, type(code.autopilot.code).__module__),
+        "wingslevel": _ours(),
+        "versions": _versions(),
+    }
+
+
+def fingerprint(decides: dict[str, Any]) -> str:
+    """SHA-256 of `decides`, hexadecimal."""
+    return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def _versions() -> dict[str, str]:
+    """Versions of all that computes; of the machine, what decides the last bits of a number."""
+    found = {name: version for name, version in versions().items() if name != "python"}
+    for package in _PEERS:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found | {"machine": f"{platform.system()} {platform.machine()}"}
+
+
+@cache
+def _ours() -> str:
+    """Every source and data file of the project itself."""
+    files = (path for package in _OURS for path in (_ROOT / package).rglob("*") if path.suffix in _KINDS)
+    return _hash(files, _ROOT)
+
+
+def _of_code(spec: str, module: str) -> str:
+    """The code of others behind `spec`, whose class is of `module`; empty where it is all of the project."""
+    place = spec.rpartition(":")[0]
+    if place.endswith(".py"):
+        return _of_file(Path(place))
+    found = {name for name in (place, module) if name in sys.modules and _is_others(sys.modules[name])}
+    return _of_modules(frozenset(found)) if found else ""
+
+
+@cache
+def _of_file(path: Path) -> str:
+    path = path.resolve()
+    loaded = [name for name, module in list(sys.modules.items()) if _file_of(module) == path]
+    beside = _hash(path.parent.glob("*.py"), path.parent)
+    return fingerprint({"beside": beside, "imported": _of_modules(frozenset(loaded))})
+
+
+@cache
+def _of_modules(names: frozenset[str]) -> str:
+    """The modules of these names, the packages that they are of, and all modules of others that they use."""
+    files: set[Path] = set()
+    seen, waiting = set(names), list(names)
+    while waiting:
+        module = sys.modules[waiting.pop()]
+        if (path := _file_of(module)) is not None:
+            files.add(path)
+            files |= set(_package_of(module, path))
+        used = {getattr(thing, "__name__" if isinstance(thing, ModuleType) else "__module__", None) or ""
+                for thing in list(vars(module).values())}  # fmt: skip
+        for name in used - seen:
+            if isinstance(name, str) and name in sys.modules and _is_others(sys.modules[name]):
+                seen.add(name)
+                waiting.append(name)
+    return _hash(files, None)
+
+
+def _package_of(module: ModuleType, path: Path) -> Iterable[Path]:
+    """All files of the package that a module is of."""
+    depth = module.__name__.count(".")
+    if not depth and path.name != "__init__.py":
+        return ()
+    top = path.parents[depth if path.name == "__init__.py" else depth - 1]
+    return top.rglob("*.py")
+
+
+def _is_others(module: ModuleType) -> bool:
+    """Whether a module is neither of the project nor of Python itself."""
+    path = _file_of(module)
+    if path is None or path.suffix != ".py" or any(path.is_relative_to(_ROOT / name) for name in _OURS):
+        return False
+    standard = [Path(sysconfig.get_path(name)).resolve() for name in ("stdlib", "platstdlib")]
+    installed = [Path(sysconfig.get_path(name)).resolve() for name in ("purelib", "platlib")]
+    if any(path.is_relative_to(folder) for folder in installed):
+        return module.__name__.partition(".")[0] not in _FIXED
+    return not any(path.is_relative_to(folder) for folder in standard)
+
+
+# Installed packages whose version is in the fingerprint, or decides nothing; others are read file by file.
+_FIXED = {"numpy", "numba", "llvmlite", "jsbsim", "scipy", "ahrs", "imufusion", "vqf", "pytest", "_pytest"}
+
+
+def _file_of(module: ModuleType) -> Path | None:
+    file = getattr(module, "__file__", None)
+    return Path(file).resolve() if isinstance(file, str) else None
+
+
+def _hash(files: Iterable[Path], root: Path | None) -> str:
+    """Over the names, below `root` where there is one, and the contents of `files`."""
+    digest = hashlib.sha256()
+    for path in sorted(set(files)):
+        name = path.relative_to(root).as_posix() if root is not None else path.name
+        data = path.read_bytes()
+        digest.update(f"{name}:{len(data)};".encode("utf-8", "surrogateescape"))
+        digest.update(data)
+    return digest.hexdigest()

@@ -1,0 +1,204 @@
+"""One JSBSim aeroplane in SI units: the only importer of jsbsim.
+
+Loading, placing, reading and writing; each property name is resolved once.  Feet and pounds end here and in the
+one kernel of `sim.aeroplane.jsbsim_plant` that turns a whole tick into SI.
+"""
+
+import math
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jsbsim
+import numpy as np
+
+from autopilot.interface import ActuatorCommand
+from estimator.interface import Array
+from sim.air import Air
+from sim.place import LATITUDE_DEG, LONGITUDE_DEG
+from sim.truth import EARTH_RATE_RAD_S
+
+FT_TO_M = 0.3048
+LB_TO_N = 4.4482216152605
+LBFT_TO_NM = LB_TO_N * FT_TO_M
+SLUG_TO_KG = LB_TO_N / FT_TO_M
+SLUGFT2_TO_KGM2 = SLUG_TO_KG * FT_TO_M**2
+
+AIRCRAFT = Path(__file__).parents[1] / "aircraft"
+
+WRITE = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
+WIND = tuple(f"atmosphere/wind-{d}-fps" for d in ("north", "east", "down"))
+INTEGRATORS = tuple(f"simulation/integrator/{a}" for a in (
+    "rate/rotational", "rate/translational", "position/rotational", "position/translational",
+))  # fmt: skip
+
+
+class _Silent(jsbsim.FGLogger):
+    """JSBSim's console output, dropped."""
+
+    def message(self, _text: str) -> None:
+        return
+
+
+_SILENT = _Silent()
+
+
+class Model:
+    """One JSBSim aeroplane in SI units: loading, placing, wind; each property name is resolved once."""
+
+    def __init__(self, aircraft: str, physics_hz: int) -> None:
+        self.folder = AIRCRAFT / aircraft
+        known = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
+        if aircraft not in known:
+            raise ValueError(f"unknown aircraft '{aircraft}': choose {', '.join(known)}")
+        self.airframe: dict[str, Any] = tomllib.loads((self.folder / "airframe.toml").read_text())
+        self.dt_s = 1.0 / physics_hz
+        jsbsim.set_logger(_SILENT)  # anew for each model: JSBSim keeps a logger per thread
+        self.fdm = jsbsim.FGFDMExec(str(self.folder))  # else it looks for its own data, and only in some installations
+        self.fdm.set_dt(self.dt_s)  # before the model: the servos' lags are worked out while loading
+        if not self.fdm.load_model_with_paths(aircraft, str(AIRCRAFT), str(self.folder), str(self.folder)):
+            raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")
+        self.run = self.fdm.run
+        self._properties = self.fdm.get_property_manager()
+        self._integrators = [(self.setter(p), self.getter(p)()) for p in INTEGRATORS]
+
+    def _node(self, name: str) -> Any:
+        node = self._properties.get_node(name)
+        if node is None:
+            raise ValueError(f"JSBSim has no property '{name}' in the aircraft '{self.folder.name}'")
+        return node
+
+    def getter(self, name: str) -> Callable[[], float]:
+        """Bound method that reads the property `name`, in JSBSim's unit."""
+        return self._node(name).get_double_value  # type: ignore[no-any-return]
+
+    def setter(self, name: str) -> Callable[[float], None]:
+        """Bound method that writes the property `name`, in JSBSim's unit."""
+        return self._node(name).set_double_value  # type: ignore[no-any-return]
+
+    def has(self, name: str) -> bool:
+        return self._properties.get_node(name) is not None
+
+    def get(self, *names: str) -> Array:
+        return np.array([self.getter(name)() for name in names])
+
+    def put(self, values: dict[str, float]) -> None:
+        """Write properties, in JSBSim's units and in the order given."""
+        for name, value in values.items():
+            self.setter(name)(value)
+
+    def mass_kg(self) -> float:
+        return float(self.get("inertia/mass-slugs")[0]) * SLUG_TO_KG
+
+    def inertia_kg_m2(self) -> Array:
+        """Principal moments of inertia, shape (3,)."""
+        return SLUGFT2_TO_KGM2 * self.get(*(f"inertia/i{a}{a}-slugs_ft2" for a in "xyz"))
+
+    @property
+    def powered(self) -> bool:
+        """Whether there is a propeller: only JSBSim's own gives its advance ratio."""
+        return self._properties.get_node("propulsion/engine/advance-ratio") is not None
+
+    def thrust_n(self) -> float:
+        """What the propeller pulled in the last step; 0 where there is none."""
+        return LB_TO_N * float(self.get("propulsion/engine/thrust-lbs")[0]) if self.powered else 0.0
+
+    def inertia_tensor_kg_m2(self) -> Array:
+        """Inertia about the centre of gravity, body axes, shape (3, 3): products of inertia with their minus signs."""
+        names = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
+        xx, yy, zz, xy, yz, xz = SLUGFT2_TO_KGM2 * self.get(*(f"inertia/{name}-slugs_ft2" for name in names))
+        return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
+
+    def wing(self) -> tuple[float, float, float]:
+        """What the coefficients refer to: area [m2], span and mean chord [m]."""
+        area, span, chord = self.get("metrics/Sw-sqft", "metrics/bw-ft", "metrics/cbarw-ft")
+        return area * FT_TO_M**2, span * FT_TO_M, chord * FT_TO_M
+
+    def density_kg_m3(self) -> float:
+        """Of the air where the aeroplane is."""
+        return float(self.get("atmosphere/rho-slugs_ft3")[0]) * SLUG_TO_KG / FT_TO_M**3
+
+    def force_and_moment(self) -> tuple[Array, Array]:
+        """All forces but gravity [N] and all moments [N m] on the body in the last step, body axes."""
+        force = LB_TO_N * self.get(*(f"forces/fb{a}-total-lbs" for a in "xyz"))
+        return force, LBFT_TO_NM * self.get(*(f"moments/{a}-total-lbsft" for a in "lmn"))
+
+    def accelerations(self) -> Array:
+        """Rates of change of the body velocity [m/s2] and of the body rates [rad/s2], shape (6,)."""
+        linear = FT_TO_M * self.get(*(f"accelerations/{a}dot-ft_sec2" for a in "uvw"))
+        return np.concatenate([linear, self.get(*(f"accelerations/{a}dot-rad_sec2" for a in "pqr"))])
+
+    def coming_rates(self) -> Array:
+        """Body rates [rad/s] that the next step will reach: what the last one has computed."""
+        rates = self.get(*(f"velocities/{a}-rad_sec" for a in "pqr"))
+        return rates + self.dt_s * self.accelerations()[3:]
+
+    def place(
+        self, height_m: float, euler_rad: tuple[float, float, float], v_b_m_s: Array,
+        omega_b_rad_s: tuple[float, float, float], command: ActuatorCommand, air: Air, settle: int,
+    ) -> None:  # fmt: skip
+        """Start anew above the launch point: velocity over the ground in body axes, servos at `command`, mean wind.
+
+        Then the motion is frozen for `settle` steps (at least 1), in which the propeller finds its speed.
+        """
+        # The frozen motion is at rest in inertial space: the earth turns on below it, to the launch point.
+        ahead_deg = math.degrees(EARTH_RATE_RAD_S * settle * self.dt_s)
+        self.put({"ic/lat-geod-deg": LATITUDE_DEG, "ic/long-gc-deg": LONGITUDE_DEG + ahead_deg})
+        self.put({"ic/terrain-elevation-ft": 0.0})
+        self.put({"ic/h-agl-ft": height_m / FT_TO_M})
+        self.put(dict(zip(("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"), euler_rad, strict=True)))
+        self.put({f"ic/{a}-fps": float(v) / FT_TO_M for a, v in zip("uvw", v_b_m_s, strict=True)})
+        self.put({f"ic/{a}-rad_sec": w for a, w in zip("pqr", omega_b_rad_s, strict=True)})
+        self.put({"atmosphere/turb-type": 0.0})  # JSBSim's own: above sea level, and astray in oblique winds
+        self.push(np.zeros(3), np.zeros(3))
+        self.fdm.run_ic()  # forgets commands and wind
+        self.put(dict(zip(WRITE, command[:4], strict=True)))
+        wind_e = air.mean_wind_e_m_s(height_m)
+        self.put({name: float(w) / FT_TO_M for name, w in zip(WIND, wind_e, strict=True)})
+        self.fdm.set_trim_status(True)  # servos jump to their commands
+        self.frozen(1)
+        self.fdm.set_trim_status(False)
+        self.frozen(settle - 1)
+
+    def frozen(self, steps: int) -> None:
+        """Run `steps` with the motion held: forces, servos and propeller go on."""
+        for write, _ in self._integrators:
+            write(0.0)
+        for _ in range(steps):
+            self.run()
+        for write, scheme in self._integrators:
+            write(scheme)
+
+    def settle(self) -> None:
+        """Hold the motion until the propeller turns steadily under the command and in the air of now.
+
+        A step of any length dt takes its speed from n to n + dt f(n).  With dt = -1 / f'(n), the slope from the two
+        steps before, that is Newton's step to f = 0: ten of them do what takes seconds of simulated time.
+        """
+        if self.powered:
+            rpm = self.getter("propulsion/engine/propeller-rpm")
+            now, before, slowing, dt_s = rpm(), math.nan, math.nan, 0.03
+            for _ in range(60):
+                self.fdm.set_dt(dt_s)
+                self.frozen(1)
+                change = rpm() - now
+                if abs(change) < 1e-12 * abs(now) or rpm() < 1e-3:
+                    break
+                slope = (change / dt_s - slowing) / (now - before) if now != before else math.nan
+                slowing, before, now = change / dt_s, now, rpm()
+                dt_s = min(0.2, max(0.005, -1.0 / slope)) if slope < 0.0 else 0.03
+            self.fdm.set_dt(self.dt_s)
+        self.frozen(2)  # what the model reads of the step before is now that of a steady propeller
+
+    def remember(self, on: bool) -> None:
+        """Off: integrate the velocity without a memory of past accelerations, which would smear a force that jumps."""
+        write, scheme = self._integrators[1]
+        write(scheme if on else 1.0)
+
+    def push(self, force_b_n: Array, moment_b_nm: Array) -> None:
+        """Set the force and the moment of the hand, body axes; they stay until set again."""
+        hand_force, moment = "external_reactions/hand", "external_reactions/hand_moment"
+        self.put({f"{hand_force}/{a}": float(f) / LB_TO_N for a, f in zip("xyz", force_b_n, strict=True)})
+        self.put({f"{moment}/{a}": float(m) / LBFT_TO_NM for a, m in zip("lmn", moment_b_nm, strict=True)})
+        self.put({f"{hand_force}/magnitude": 1.0, f"{moment}/magnitude-lbsft": 1.0})

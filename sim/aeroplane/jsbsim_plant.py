@@ -1,0 +1,351 @@
+"""JSBSim behind the Plant protocol.
+
+A tick is four writes, a few physics steps with no reads between them, and one packed read that a kernel turns
+into the truth row in SI units.  The inertial means of the row come from the change of attitude and velocity
+over the tick (`sim.truth.integrate_imu`).
+"""
+
+import math
+from dataclasses import dataclass
+from struct import Struct
+
+import numpy as np
+
+from autopilot.interface import NEUTRAL, ActuatorCommand
+from estimator.compiler.jit import kernel
+from estimator.interface import Array
+from sim.aeroplane import hand
+from sim.aeroplane.jsbsim_model import FT_TO_M, LB_TO_N, WIND, WRITE, Model
+from sim.aeroplane.trim import Trim, trim
+from sim.air import STILL, Air, MovingAir
+from sim.clock import Rates
+from sim.log import Log, Outcome, Phase
+from sim.place import LATITUDE_DEG
+from sim.plant import HandThrow, InFlight, SimulationDiverged, Start
+from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
+
+# What is read after each tick: field of the state record, its JSBSim properties.
+READ: dict[str, tuple[str, ...]] = {
+    "euler_rad": ("attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad"),
+    "omega_b_rad_s": ("velocities/pi-rad_sec", "velocities/qi-rad_sec", "velocities/ri-rad_sec"),
+    "p_neu_ft": ("position/from-start-neu-n-ft", "position/from-start-neu-e-ft", "position/from-start-neu-u-ft"),
+    "v_e_fps": ("velocities/v-north-fps", "velocities/v-east-fps", "velocities/v-down-fps"),
+    "wind_e_fps": tuple(f"atmosphere/total-wind-{d}-fps" for d in ("north", "east", "down")),
+    "surfaces": ("servo/aileron", "servo/elevator", "servo/rudder", "fcs/throttle-pos-norm"),
+    "motor": ("propulsion/engine/propeller-rpm", "propulsion/engine/thrust-lbs"),
+    "contact": ("forces/fbz-gear-lbs",),
+}
+# Rates of the air, which an aeroplane's damping terms take off its own (JSBSim's own turbulence rates cannot be set).
+AIR_RATES = tuple(f"gust/{a}-rad_sec" for a in "pqr")
+STATE_DTYPE = np.dtype(
+    [
+        *((name, "f8", (len(properties),)) for name, properties in READ.items()),  # packed into its first bytes
+        ("R_eb", "f8", (3, 3)),  # at the end of the previous tick
+        ("v_e_m_s", "f8", (3,)),
+        ("origin_e_m", "f8", (3,)),  # where the start is, from the launch point
+        ("earth_rate_e", "f8", (3,)),
+        ("g_m_s2", "f8"),
+        ("dt_s", "f8"),
+        ("box_radius_m", "f8"),
+        ("box_height_m", "f8"),
+    ],
+    align=True,
+)
+MOVING_PARTS = ("aileron", "elevator", "rudder", "throttle", "rotor_rpm", "thrust_n")  # at rest in the hand
+OUTCOMES = (None, Outcome.GROUND_CONTACT, Outcome.LEFT_BOX, Outcome.DIVERGED)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightBox:
+    """Where the flight may be: a cylinder around the launch point; beyond it the flight is over."""
+
+    radius_m: float = 3000.0
+    height_m: float = 1000.0
+
+
+@kernel
+def rotation_of(roll_rad, pitch_rad, yaw_rad, R_eb):  # type: ignore[no-untyped-def]
+    """Write into `R_eb` the body-to-earth rotation of the Euler angles (Etkin & Reid, section 4.4)."""
+    cr, sr = np.cos(roll_rad), np.sin(roll_rad)
+    cp, sp = np.cos(pitch_rad), np.sin(pitch_rad)
+    cy, sy = np.cos(yaw_rad), np.sin(yaw_rad)
+    R_eb[0, 0], R_eb[0, 1], R_eb[0, 2] = cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy
+    R_eb[1, 0], R_eb[1, 1], R_eb[1, 2] = cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy
+    R_eb[2, 0], R_eb[2, 1], R_eb[2, 2] = -sp, sr * cp, cr * cp
+
+
+@kernel
+def complete(truth, k, state):  # type: ignore[no-untyped-def]
+    """Fill what follows from attitude, velocity and wind of row k: inertial means, airspeed, alpha, beta, time."""
+    row, s = truth[k], state[0]
+    integrate_imu(s.R_eb, s.v_e_m_s, row, s.dt_s, s.g_m_s2, s.earth_rate_e)
+    R = row.R_eb
+    v_e, wind_e = row.v_e_m_s, row.wind_e_m_s
+    an, ae, ad = v_e[0] - wind_e[0], v_e[1] - wind_e[1], v_e[2] - wind_e[2]
+    u = R[0, 0] * an + R[1, 0] * ae + R[2, 0] * ad
+    v = R[0, 1] * an + R[1, 1] * ae + R[2, 1] * ad
+    w = R[0, 2] * an + R[1, 2] * ae + R[2, 2] * ad
+    row.t_s = (k + 1) * s.dt_s
+    row.airspeed_m_s = np.sqrt(u * u + v * v + w * w)
+    row.alpha_rad = np.arctan2(w, u)
+    row.beta_rad = np.arctan2(v, np.sqrt(u * u + w * w))
+    for i in range(3):
+        s.v_e_m_s[i] = row.v_e_m_s[i]
+        for j in range(3):
+            s.R_eb[i, j] = R[i, j]
+
+
+@kernel
+def observe(truth, k, state):  # type: ignore[no-untyped-def]
+    """Turn what JSBSim reports into truth row k, in SI; return the index of the outcome in OUTCOMES, 0 to fly on."""
+    row, s = truth[k], state[0]
+    rotation_of(s.euler_rad[0], s.euler_rad[1], s.euler_rad[2], row.R_eb)
+    rate2 = speed2 = 0.0
+    for i in range(3):
+        row.omega_b_rad_s[i] = s.omega_b_rad_s[i]
+        row.v_e_m_s[i] = FT_TO_M * s.v_e_fps[i]
+        row.wind_e_m_s[i] = FT_TO_M * s.wind_e_fps[i]
+        row.p_e_m[i] = s.origin_e_m[i] + FT_TO_M * s.p_neu_ft[i] * (1.0 if i < 2 else -1.0)
+        rate2 += row.omega_b_rad_s[i] ** 2
+        speed2 += row.v_e_m_s[i] ** 2
+    row.aileron, row.elevator, row.rudder, row.throttle = s.surfaces[0], s.surfaces[1], s.surfaces[2], s.surfaces[3]
+    row.phase = 2  # flying
+    row.rotor_rpm, row.thrust_n = s.motor[0], LB_TO_N * s.motor[1]
+    complete(truth, k, state)
+    n, e, d = row.p_e_m[0], row.p_e_m[1], row.p_e_m[2]
+    if not (rate2 < 1e4 and speed2 < 4e4 and abs(d) < 1e6 and abs(s.euler_rad[0]) < 10.0):  # NaN fails too
+        return 3
+    if s.contact[0] != 0.0:
+        return 1
+    if n * n + e * e > s.box_radius_m**2 or -d > s.box_height_m:
+        return 2
+    return 0
+
+
+class JsbsimPlant:
+    """An aeroplane flown by JSBSim.
+
+    Parameters
+    ----------
+    aircraft : name of a folder of `sim/aircraft`
+    start : in the air or thrown by hand
+    air : wind, gusts, turbulence, thermals
+    rates : physics and inertial rates
+    seed, flight : which random streams (the turbulence alone draws any here)
+    box : where the flight may be; a start outside it is refused
+
+    Raises ValueError for an unknown aircraft or a start that cannot be.
+    """
+
+    def __init__(
+        self, aircraft: str = "endurance", *, start: Start, air: Air = STILL, rates: Rates | None = None,
+        seed: int = 0, flight: int = 0, box: FlightBox | None = None,
+    ) -> None:  # fmt: skip
+        rates = rates or Rates()
+        box = box or FlightBox()
+        self.start, self.air = start, air
+        self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
+        self._physics_hz, self._aircraft = rates.physics_hz, aircraft
+        self._hold_ticks = self._release_tick = self._hand_ticks = 0
+        if isinstance(start, HandThrow):
+            hand.check(start)
+            self._hold_ticks = rates.ticks(start.hold_s)
+            self._release_tick = self._hold_ticks + max(1, rates.ticks(start.push_s))
+            self._hand_ticks = self._release_tick + 1  # the first tick of the flight puts its integrator away
+        self.release_s = self._release_tick * self.dt_s
+        self._load()
+        span_m = FT_TO_M * float(self.model.get("metrics/bw-ft")[0])
+        self._moving_air = MovingAir(air, span_m, self.dt_s, self.release_s, seed, flight)
+        self._air_moves = not air.is_steady
+        self.airframe = self.model.airframe
+        self.trimmed = Trim.of(self.airframe["cruise"])
+        if isinstance(start, InFlight):
+            if not (math.isfinite(start.heading_rad) and 0.0 < start.height_m < 10_000.0):
+                raise ValueError(
+                    f"height_m {start.height_m} m: must be above 0 and below 10000 m, with a finite heading"
+                )
+            out_m = math.hypot(start.north_m, start.east_m)
+            if not (out_m < box.radius_m and start.height_m < box.height_m):
+                raise ValueError(
+                    f"start {out_m:g} m out and {start.height_m:g} m high: must be inside the flight box, "
+                    f"box_radius_m {box.radius_m:g} m and box_height_m {box.height_m:g} m"
+                )
+            airspeed_m_s = self.trimmed.airspeed_m_s if start.airspeed_m_s is None else start.airspeed_m_s
+            self.trimmed = trim(self.model, airspeed_m_s, start.height_m, heading_rad=start.heading_rad)
+        self._state = np.zeros(1, STATE_DTYPE)
+        self._buffer = self._state.data
+        latitude_rad = math.radians(LATITUDE_DEG)
+        s = self._state[0]
+        s["earth_rate_e"], s["g_m_s2"] = earth_rate_e_rad_s(latitude_rad), gravity_m_s2(latitude_rad)
+        s["dt_s"], s["box_radius_m"], s["box_height_m"] = self.dt_s, box.radius_m, box.height_m
+
+    def _load(self) -> None:
+        """A JSBSim of its own for each flight: blown-up states outlive any reset."""
+        self.model = Model(self._aircraft, self._physics_hz)
+        self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
+        self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._wind = tuple(self.model.setter(p) for p in WIND)
+        self._air_rates = tuple(self.model.setter(p) for p in AIR_RATES if self.model.has(p))
+        self._pack = Struct(f"{len(self._getters)}d").pack_into
+
+    def reset(self, log: Log) -> None:
+        """Put the aeroplane at its start; the rows of `log` are filled from tick 0 on."""
+        self._load()
+        self._truth = log.truth
+        s = self._state[0]
+        start = self.start
+        if isinstance(start, HandThrow):
+            self._moving_air.start(len(log), (0.0, 0.0, -start.height_m))
+            rotation_of(*hand.sway(start, 0.0)[0], s["R_eb"])
+            s["v_e_m_s"] = 0.0
+        else:
+            self._moving_air.start(len(log), (start.north_m, start.east_m, -start.height_m))
+            self._start_in_flight(start)
+
+    def _start_in_flight(self, start: InFlight) -> None:
+        """Trimmed relative to the moving air, heading as asked; servos and propeller as in the trim."""
+        t = self.trimmed
+        euler_rad = t.euler_rad(start.heading_rad)
+        R_eb = np.empty((3, 3))
+        rotation_of(*euler_rad, R_eb)
+        v_b = t.air_velocity_b_m_s + R_eb.T @ self._moving_air.wind_e_m_s
+        self.begin((start.north_m, start.east_m, -start.height_m), euler_rad, v_b, command=t.command)
+
+    def begin(
+        self, p_e_m: tuple[float, float, float], euler_rad: tuple[float, float, float], v_b_m_s: Array,
+        omega_b_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0), command: ActuatorCommand = NEUTRAL,
+        settle_s: float = 1.0,
+    ) -> None:  # fmt: skip
+        """Put the aeroplane into any state, to fly on from there.
+
+        p_e_m : (north, east, down) from the launch point       euler_rad : roll, pitch, yaw
+        v_b_m_s : (3,) velocity over the ground, body axes      omega_b_rad_s : body rates against the earth
+        command : where the servos are                          settle_s : time for the propeller to find its speed
+        """
+        s = self._state[0]
+        rotation_of(*euler_rad, s["R_eb"])
+        s["v_e_m_s"] = s["R_eb"] @ v_b_m_s
+        settle = max(1, round(settle_s / self.model.dt_s))
+        self.model.place(-p_e_m[2], euler_rad, v_b_m_s, omega_b_rad_s, command, self.air, settle)
+        self._anchor(p_e_m)
+        if self._air_moves:
+            self._blow(*self._moving_air.now)
+
+    def _anchor(self, p_e_m: tuple[float, float, float]) -> None:
+        """Let the place where JSBSim now is be `p_e_m`."""
+        n, e, u = FT_TO_M * self.model.get(*READ["p_neu_ft"])
+        self._state[0]["origin_e_m"] = np.array(p_e_m) - np.array([n, e, -u])
+
+    def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
+        """Fly tick `k` under `command` and fill truth row k; an Outcome where the flight ended in it."""
+        if self._air_moves:
+            self._blow(*self._moving_air.blow(self._truth, k))
+        if k < self._hand_ticks:
+            return self._in_hand(k, command)
+        self._command(command)
+        run = self.model.run
+        try:
+            for _ in range(self.steps):
+                run()
+        except RuntimeError as error:  # JSBSim's own: it will not go on from here
+            raise SimulationDiverged(f"JSBSim gave up at {k * self.dt_s:.2f} s: {error}") from error
+        return self._observe(k)
+
+    def _blow(self, *air: float) -> None:
+        """Set the wind (3) and the rates of the air (3), which hold over the tick."""
+        for write, speed_m_s in zip(self._wind, air[:3], strict=True):
+            write(speed_m_s / FT_TO_M)
+        for write, rate_rad_s in zip(self._air_rates, air[3:], strict=False):  # none where the aeroplane has none
+            write(rate_rad_s)
+
+    def _command(self, command: ActuatorCommand) -> None:
+        self._aileron(command[0])
+        self._elevator(command[1])
+        self._rudder(command[2])
+        self._throttle(command[3])
+
+    def _observe(self, k: int) -> Outcome | None:
+        self._pack(self._buffer, 0, *[read() for read in self._getters])
+        ended = OUTCOMES[observe(self._truth, k, self._state)]
+        if ended is Outcome.DIVERGED:
+            speed_m_s, rate_rad_s = (np.linalg.norm(self._truth[name][k]) for name in ("v_e_m_s", "omega_b_rad_s"))
+            raise SimulationDiverged(
+                f"the simulation blew up at {(k + 1) * self.dt_s:.2f} s: {speed_m_s:.3g} m/s, {rate_rad_s:.3g} rad/s"
+            )
+        return ended
+
+    def run_bare(self, n_ticks: int) -> None:
+        """The physics of `n_ticks` and nothing else, commands as they are: what a benchmark compares with."""
+        run = self.model.run
+        for _ in range(n_ticks * self.steps):
+            run()
+
+    def _in_hand(self, k: int, command: ActuatorCommand) -> Outcome | None:
+        """Tick k of a throw, up to and with the first tick of the flight."""
+        start = self.start
+        if not isinstance(start, HandThrow):
+            raise TypeError("only a thrown aeroplane is ever in the hand")
+        if k < self._hold_ticks:
+            self._hold(start, k)
+            return None
+        if k == self._hold_ticks:
+            self._begin_push(start)
+        self._command(command)
+        first = (k - self._hold_ticks) * self.steps
+        last = (self._release_tick - self._hold_ticks) * self.steps
+        for step in range(first + 1, first + self.steps + 1):
+            # What is set before a run acts in the next one: nothing may be left for the first step of the flight.
+            if step < last:
+                self._push(start, (step + 1) / last)
+            elif step == last:
+                self._set_hand(np.zeros(3), np.zeros(3))
+            self.model.run()
+        outcome = self._observe(k)
+        if k < self._release_tick:
+            self._truth[k]["phase"] = Phase.THROWN
+        else:
+            self.model.remember(True)
+        return outcome
+
+    def _hold(self, start: HandThrow, k: int) -> None:
+        """Truth row k in the hand: at rest at the launch point but for the sway."""
+        euler_rad, rates = hand.sway(start, (k + 1) * self.dt_s)
+        row = self._truth[k]
+        for name in MOVING_PARTS:
+            row[name] = 0.0
+        rotation_of(*euler_rad, row["R_eb"])
+        row["omega_b_rad_s"] = np.array(rates) + row["R_eb"].T @ self._state[0]["earth_rate_e"]
+        row["p_e_m"] = (0.0, 0.0, -start.height_m)
+        row["v_e_m_s"] = 0.0
+        row["wind_e_m_s"] = self._moving_air.wind_e_m_s
+        row["phase"] = Phase.HELD
+        complete(self._truth, k, self._state)
+
+    def _begin_push(self, start: HandThrow) -> None:
+        """JSBSim takes over where the closed form ends, the hand already pushing."""
+        euler_rad, rates = hand.sway(start, self._hold_ticks * self.dt_s)
+        self._rates_at_push = np.array(rates)
+        self.begin((0.0, 0.0, -start.height_m), euler_rad, np.zeros(3), rates, settle_s=0.0)
+        self._set_hand(np.zeros(3), np.zeros(3))
+        self._push(start, 1.0 / ((self._release_tick - self._hold_ticks) * self.steps))
+        self.model.frozen(1)
+        self._anchor((0.0, 0.0, -start.height_m))
+        self.model.remember(False)
+
+    def _push(self, start: HandThrow, part: float) -> None:
+        """Set the hand's force and moment so that the rates are right when `part` (0..1) of the push is over."""
+        force, moment = self.model.force_and_moment()
+        others = force - self._hand[0], moment - self._hand[1]
+        wanted = (1.0 - part) * self._rates_at_push + part * np.array(start.release_rate_b_rad_s)
+        R_eb = np.empty((3, 3))
+        rotation_of(*self.model.get(*READ["euler_rad"]), R_eb)
+        self._set_hand(
+            *hand.guide(
+                R_eb, self.model.coming_rates(), wanted, others, start.push_m_s2,
+                float(self._state[0]["g_m_s2"]), self.model.mass_kg(), self.model.inertia_kg_m2(), self.model.dt_s,
+            )
+        )  # fmt: skip
+
+    def _set_hand(self, force_b_n: Array, moment_b_nm: Array) -> None:
+        self._hand = force_b_n, moment_b_nm
+        self.model.push(force_b_n, moment_b_nm)

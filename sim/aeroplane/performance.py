@@ -1,0 +1,206 @@
+"""What an aeroplane can do, each figure from trims of the whole model: stall, glide, climb, speed, turn and roll.
+
+The glide polar is walked by angle of attack, motor off, because speed turns back at the stall and angle does not.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.optimize import minimize_scalar  # type: ignore[import-untyped]
+
+from sim.aeroplane.trim import Search, Trim, settled, surfaces, trim
+
+if TYPE_CHECKING:
+    from sim.aeroplane.jsbsim_model import Model
+
+STEP_RAD = math.radians(0.25)
+FASTEST = 3.0  # times the stall speed: where the polar ends
+BANKS_DEG = (15.0, 30.0, 45.0, 60.0)
+BANKED_ENOUGH_RAD, LONG_ENOUGH_S = math.radians(60.0), 3.0  # where the roll ends
+
+
+@dataclass(frozen=True, slots=True)
+class Roll:
+    """Full deflection from the cruise: which surface, the greatest roll rate, and the time to a bank of 45 deg."""
+
+    surface: str
+    rate_rad_s: float
+    to_45_deg_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """Trims of one aeroplane at one height.
+
+    polar : glides with the motor off, from fast to slow
+    stall : the slowest glide                               stall_by : "lift", or "elevator" where that is at its stop
+    best_glide, min_sink : of the polar
+    climbs : full throttle, by speed                        levels : level flight, by speed; glides without a motor
+    best_climb, steepest, top_speed : None without a motor
+    turns : steady turns at BANKS_DEG, as far as it can     turns_end : what it cannot, empty where it can all
+    """
+
+    height_m: float
+    cruise: Trim
+    polar: tuple[Trim, ...]
+    stall: Trim
+    stall_by: str
+    best_glide: Trim
+    min_sink: Trim
+    climbs: tuple[Trim, ...]
+    levels: tuple[Trim, ...]
+    best_climb: Trim | None
+    steepest: Trim | None
+    top_speed: Trim | None
+    turns: tuple[Trim, ...]
+    turns_end: str
+    roll: Roll
+
+
+def measure(model: "Model", height_m: float = 60.0) -> Performance:
+    """Fly all trims of `Performance`, about a second."""
+    cruise = trim(model, model.airframe["cruise"]["airspeed_m_s"], height_m)
+    glide = Glides(model, height_m)
+    polar, stall_by = glide.polar(cruise)
+    stall = glide.best(polar, lambda t: -t.airspeed_m_s) if stall_by == "lift" else polar[-1]
+    min_sink = glide.best(polar, lambda t: t.climb_m_s)
+    climbs: tuple[Trim, ...] = ()
+    levels = tuple(t for t in polar if t.alpha_rad <= stall.alpha_rad)
+    best_climb = steepest = top_speed = None
+    if model.powered:
+        top_speed = _top_speed(model, cruise, height_m)
+        speeds = np.linspace(1.03 * stall.airspeed_m_s, 0.999 * top_speed.airspeed_m_s, 30)
+        climbs, levels = _sweep(model, speeds, height_m, throttle=1.0), _sweep(model, speeds, height_m, throttle=None)
+        best_climb = _best_climb(model, climbs, height_m, lambda t: t.climb_m_s)
+        steepest = _best_climb(model, climbs, height_m, lambda t: t.climb_rad)
+    return Performance(
+        height_m, cruise, polar, stall, stall_by, glide.best(polar, lambda t: t.climb_rad), min_sink, climbs, levels,
+        best_climb, steepest, top_speed, *turns(model, min_sink, height_m), roll(model, cruise, height_m),
+    )  # fmt: skip
+
+
+class Glides:
+    """Straight glides by angle of attack."""
+
+    def __init__(self, model: "Model", height_m: float) -> None:
+        self._search = Search(model, ("airspeed_m_s", "climb_rad", "roll_rad", *surfaces(model)), height_m)
+
+    def at(self, alpha_rad: float, near: Trim) -> Trim | None:
+        """The glide at `alpha_rad`, None where it cannot be held; `near` is a glide to start from."""
+        found, left, _ = self._search.run(replace(near, alpha_rad=alpha_rad, throttle=0.0))
+        return found if np.max(np.abs(left)) < 1e-9 else None
+
+    def polar(self, start: Trim) -> tuple[tuple[Trim, ...], str]:
+        """Glides a quarter of a degree apart, from fast to beyond the slowest, and what ends them: lift or elevator."""
+        first = self.at(start.alpha_rad, replace(start, climb_rad=-0.1))
+        if first is None:
+            raise ValueError(f"alpha {math.degrees(start.alpha_rad):.1f} deg of the cruise: no glide there")
+        slow, ended = [first], "elevator"
+        while (t := self.at(slow[-1].alpha_rad + STEP_RAD, slow[-1])) is not None:
+            slow.append(t)
+            if t.airspeed_m_s > 1.01 * min(s.airspeed_m_s for s in slow):
+                ended = "lift"
+                break
+        slowest = min(s.airspeed_m_s for s in slow)
+        fast = [first]
+        while (t := self.at(fast[-1].alpha_rad - STEP_RAD, fast[-1])) is not None:
+            if not fast[-1].airspeed_m_s < t.airspeed_m_s < FASTEST * slowest:
+                break
+            fast.append(t)
+        return (*fast[:0:-1], *slow), ended
+
+    def best(self, polar: tuple[Trim, ...], merit: Callable[[Trim], float]) -> Trim:
+        """The glide of greatest merit, between the two neighbours of the best of `polar`."""
+        i = max(range(len(polar)), key=lambda k: merit(polar[k]))
+        low, high = polar[max(i - 1, 0)].alpha_rad, polar[min(i + 1, len(polar) - 1)].alpha_rad
+        tried = [polar[i]]
+
+        def cost(alpha_rad: float) -> float:
+            t = self.at(float(alpha_rad), polar[i])
+            if t is None:
+                return math.inf
+            tried.append(t)
+            return -merit(t)
+
+        minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 1e-6})
+        return max(tried, key=merit)
+
+
+def _sweep(model: "Model", speeds_m_s: np.ndarray, height_m: float, throttle: float | None) -> tuple[Trim, ...]:
+    """Straight flight at each speed that has it, at a throttle or level."""
+    found: list[Trim] = []
+    for speed in speeds_m_s:
+        try:
+            near = replace(found[-1], airspeed_m_s=float(speed)) if found else None
+            found.append(trim(model, float(speed), height_m, throttle=throttle, guess=near))
+        except ValueError:
+            continue
+    return tuple(found)
+
+
+def _best_climb(model: "Model", climbs: tuple[Trim, ...], height_m: float, merit: Callable[[Trim], float]) -> Trim:
+    """The climb of greatest merit, between the two neighbours of the best of `climbs`."""
+    i = max(range(len(climbs)), key=lambda k: merit(climbs[k]))
+    tried = [climbs[i]]
+
+    def cost(speed_m_s: float) -> float:
+        tried.append(trim(model, float(speed_m_s), height_m, throttle=1.0, guess=climbs[i]))
+        return -merit(tried[-1])
+
+    bounds = climbs[max(i - 1, 0)].airspeed_m_s, climbs[min(i + 1, len(climbs) - 1)].airspeed_m_s
+    minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-5})
+    return max(tried, key=merit)
+
+
+def _top_speed(model: "Model", cruise: Trim, height_m: float) -> Trim:
+    """Level flight at full throttle: the speed is what is looked for."""
+    search = Search(model, ("airspeed_m_s", "alpha_rad", "roll_rad", *surfaces(model)), height_m)
+    guess = replace(cruise, throttle=1.0, climb_rad=0.0, airspeed_m_s=1.5 * cruise.airspeed_m_s)
+    found, left, _ = search.run(guess)
+    if not np.max(np.abs(left)) < 1e-9:
+        raise ValueError(
+            f"throttle 1: '{model.folder.name}' has no level flight at full throttle, more motor is needed"
+        )
+    return found
+
+
+def turns(model: "Model", min_sink: Trim, height_m: float) -> tuple[tuple[Trim, ...], str]:
+    """Steady turns to the right and what ends them; level with a motor, gliding without.
+
+    Each is flown at a twentieth above the speed of least sink for its load, which goes with sqrt(load).
+    """
+    found: list[Trim] = []
+    for bank_deg in BANKS_DEG:
+        bank_rad = math.radians(bank_deg)
+        speed = 1.05 * min_sink.airspeed_m_s / math.sqrt(math.cos(bank_rad))
+        try:
+            found.append(trim(model, speed, height_m, bank_rad=bank_rad))
+        except ValueError as problem:
+            return tuple(found), f"{bank_deg:g} deg of bank at {speed:.1f} m/s: {str(problem).partition(' m, ')[2]}"
+    return tuple(found), ""
+
+
+def radius_m(t: Trim) -> float:
+    """Of a turn, over still ground."""
+    return t.airspeed_m_s * math.cos(t.climb_rad) / abs(t.turn_rate_rad_s)
+
+
+def roll(model: "Model", cruise: Trim, height_m: float) -> Roll:
+    """Hold full aileron, or full rudder where there is none, until 60 deg of bank or for three seconds."""
+    surface = "aileron" if surfaces(model)[0] == "aileron" else "rudder"
+    euler_rad = cruise.euler_rad()
+    settled(model, height_m, euler_rad, cruise.air_velocity_b_m_s, cruise.omega_b_rad_s, cruise.command)
+    model.setter(f"fcs/{surface}-cmd-norm")(1.0)
+    bank, rate = model.getter("attitude/phi-rad"), model.getter("velocities/p-rad_sec")
+    greatest, to_45 = 0.0, math.inf
+    for k in range(round(LONG_ENOUGH_S / model.dt_s)):
+        model.run()
+        greatest = max(greatest, rate())
+        if bank() > math.radians(45.0):
+            to_45 = min(to_45, (k + 1) * model.dt_s)
+        if bank() > BANKED_ENOUGH_RAD:
+            break
+    return Roll(surface, greatest, to_45)
