@@ -27,10 +27,13 @@ from scenarios.harness.cli.options import (
     GustOption,
     ImuRateOption,
     JsonOption,
+    KindArgument,
     LedgerOption,
     LogEstimatorsOption,
     MarkdownOption,
+    NamesArgument,
     ParameterOption,
+    ParamsOption,
     ReferenceOption,
     ScenarioArgument,
     SensorsOption,
@@ -114,15 +117,21 @@ def _root(
 
 
 @app.command("list")
-def list_(json_: JsonOption = None) -> None:
-    """What there is: scenarios, estimators, autopilots, aircraft, sensor suites, parts."""
-    from scenarios.harness.commands.catalogue import catalogue
+def list_(kind: KindArgument = None, names: NamesArgument = None, params: ParamsOption = False,
+          json_: JsonOption = None) -> None:  # fmt: skip
+    """Scenarios, estimators, autopilots, aircraft, sensor suites and parts, with where each one comes from."""
+    from scenarios.harness.commands import listing
 
     with reporting(json_) as report:
-        found = catalogue()
-        for kind, things in found.items():
-            console.out().print(console.name_table(kind, things))
-        report(found)
+        with usage():
+            if params:
+                parameters = listing.parameters(kind, names or [])
+                report({"estimators": parameters})
+                listing.print_parameters(parameters)
+                return
+            found = listing.listing(kind, names or [])
+        report(found.to_json())
+        listing.print_listing(found)
 
 
 @app.command()

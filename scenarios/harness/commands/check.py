@@ -12,6 +12,7 @@ from typing import Any
 
 from scenarios.harness.cli import console
 from scenarios.harness.cli import reports as cli_reports
+from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.config import LARGEST_SEED
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.gate.ledger import Ledger
@@ -81,6 +82,7 @@ def tasks(
     found = []
     for name, (scenario, config) in zip(wanted, configs, strict=True):
         console.warn_of_faults(name, config)
+        note_ignored(name, config)
         decides = decided_by(name, config) | {"changes": recording.plain(changes)} if keyed else {}
         for seed in seeds:
             key = fingerprint(decides | {"seed": seed}) if keyed else ""

@@ -22,6 +22,7 @@ from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import Array, HeadingReference, Measurements
 from scenarios.harness.aboard import flight_code, instruments_of
 from scenarios.harness.cli import console
+from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.fitted import suite_params
 from scenarios.harness.flight import fly_config, fly_scenario
@@ -284,6 +285,7 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     configs = [prepared(scenario, {**changes_of[name], "estimator": name}, lenient=True)[1] for name in names]
     made = {name: flight_code(of_it).estimator.code for name, of_it in zip(names, configs, strict=True)}
     console.warn_of_faults(scenario, configs[0])
+    note_ignored(scenario, configs[0])
     references = {name: heading_reference_of(estimator) for name, estimator in made.items()}
     instruments = {name: given(estimator, configs[0]) for name, estimator in made.items()}
     notes = (*without(of_each, settings), *_unheard(names, configs))

@@ -8,6 +8,7 @@ from typing import Any
 from estimator.instruments import to_json
 from scenarios.harness.cli import console
 from scenarios.harness.commands import view as viewing
+from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import fly_config
 from scenarios.harness.gate import guard
@@ -80,6 +81,7 @@ def fly(
         scenario, config = prepared(scenario_name, changes)
     recording.check_writable(into)
     console.warn_of_faults(scenario.name, config)
+    note_ignored(scenario.name, config)
     if _FLIGHT in guard.lost:
         timed_out, message = guard.lost[_FLIGHT]
         outcome = Outcome.TIMED_OUT if timed_out else Outcome.WORKER_DIED
