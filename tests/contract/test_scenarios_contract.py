@@ -9,9 +9,9 @@ import pytest
 import scenarios
 from autopilot.interface import Mode
 from scenarios.harness.config import FlightConfig, resolve
-from scenarios.harness.metrics import planned_end_s
+from scenarios.harness.metrics import planned_end_s, summary
 from scenarios.harness.registry import find, registered
-from scenarios.harness.verdict import judge
+from scenarios.harness.verdict import judge, metric_name
 from sim.log import Flight, Log, Outcome, Phase
 
 NAMES = sorted(registered())
@@ -65,6 +65,14 @@ def test_scenario_checks_demand_survival_and_say_their_units(name):
     checks = find(name).checks
     assert checks[0].name == "survived" or find(name).shows_failure
     assert all(check.name and (check.unit or check.name == "survived") for check in checks)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scenario_checks_have_metric_names_of_their_own(name):
+    """No name among the metrics of a flight is numbered: neither a general metric nor another check has it."""
+    general = summary(Flight(Log.empty(0), 0.02, 0.0, Outcome.DIVERGED, "course"))
+    names = [*general, *(metric_name(check.name, check.unit) for check in find(name).checks)]
+    assert len(set(names)) == len(names)
 
 
 @pytest.mark.parametrize("name", NAMES)

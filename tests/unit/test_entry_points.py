@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness import plugins, registry
+from scenarios.harness import plugins
 from scenarios.harness.cli.app import run
 from scenarios.harness.cli.values import estimators as completed_estimators
 from scenarios.harness.cli.values import scenarios as completed_scenarios
 from scenarios.harness.cli.values import suites as completed_suites
 from scenarios.harness.commands import listing
-from scenarios.harness.config import FlightConfig, override, resolve
+from scenarios.harness.config import FlightConfig, overridden, override, resolve
+from scenarios.harness.flight import prepare
 from scenarios.harness.gate.sources import decided_by
 from sim.outside.entry_points import ignored, offered
 from sim.sensors.fitting import load_suite, own_files
@@ -244,8 +245,7 @@ def test_fingerprint_covers_the_sources_of_the_package(package: Path, file: str,
     def decides() -> object:
         for cached in (sources._of_file, sources._of_modules):
             cached.cache_clear()
-        config = resolve(override(registry.find("storm").config, {"estimator": spec, "suite": "bench"}))
-        return decided_by("storm", config)[part]
+        return decided_by("storm", prepare("storm", {"estimator": spec, "suite": "bench"}))[part]
 
     before = decides()
     (package / file).write_text((package / file).read_text() + "\n# edited\n")
@@ -254,7 +254,7 @@ def test_fingerprint_covers_the_sources_of_the_package(package: Path, file: str,
 
 def test_suite_of_a_package_flies_again_from_the_record_without_the_package(package: Path, monkeypatch) -> None:
     """The resolved configuration holds its files, under paths that are the same on every machine."""
-    config = resolve(override(FlightConfig(), {"suite": "bench"}))
+    config = resolve(*overridden(FlightConfig(), {"suite": "bench"}))
     assert sorted(config.files) == ["bench", "bench/my_gyro.toml"]
     fitted = load_suite("bench")
     assert fitted == load_suite(str(package / "bench.toml"))

@@ -17,10 +17,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from scenarios.harness.aboard import flight_code
-from scenarios.harness.config import FlightConfig
+from scenarios.harness.flight import Prepared
 from scenarios.harness.plugins import module_of_offer
-from scenarios.harness.registry import find
 from scenarios.harness.registry import module_of_offer as module_of_scenario
 from sim.recording import versions
 
@@ -30,15 +28,15 @@ _KINDS = {".py", ".toml", ".xml"}
 _PEERS = ("scipy", "ahrs", "imufusion", "vqf")  # packages of others that our estimators fly with
 
 
-def decided_by(scenario: str, config: FlightConfig) -> dict[str, Any]:
-    """Everything that decides the flight of a scenario, by name or file, under the resolved `config`."""
-    code = flight_code(config)
+def decided_by(named: str, prepared: Prepared) -> dict[str, Any]:
+    """Everything that decides a flight; `named` is its scenario as it was named, which may be a file."""
+    config = prepared.config
     return {
-        "scenario": find(scenario).name,
-        "scenario_file": _of_scenario(scenario),
+        "scenario": prepared.scenario.name,
+        "scenario_file": _of_scenario(named),
         "config": config.model_dump(mode="json"),
-        "estimator": _of_code("estimator", config.estimator, type(code.estimator.code).__module__),
-        "autopilot": _of_code("autopilot", config.autopilot, type(code.autopilot.code).__module__),
+        "estimator": _of_code("estimator", config.estimator, type(prepared.estimator.code).__module__),
+        "autopilot": _of_code("autopilot", config.autopilot, type(prepared.autopilot.code).__module__),
         "wingslevel": _ours(),
         "versions": _versions(),
     }
