@@ -25,8 +25,8 @@ from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claims.flights import flights
 from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import inclination_error_deg, rms
+from sim.loop import mean_sample
 from sim.motion.prescribed_plant import HandHeld, Motion, Rest, SteadyTurn, StraightLevel
-from sim.power_up import mean_sample
 
 FEW_DEG = 5.0  # "a few degrees"
 MINUTE_S = 60.0

@@ -70,6 +70,15 @@ def load_suite(name: str, files: Mapping[str, str] = NO_FILES) -> SuiteParams:
         return _fit(file, data, _folder(name), files)
 
 
+def suite_params(suite: str, changes: Mapping[str, Any], files: Mapping[str, str] = NO_FILES) -> SuiteParams:
+    """The suite of that name with some figures changed, by dotted names; ValueError for a suite or figure not there.
+
+    files : path -> text, as for `load_suite`
+    """
+    params = SUITES[suite] if suite in set(SUITES) else load_suite(suite, files)
+    return changed(params, changes, f"sensor suite {suite}")
+
+
 def own_files(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
     """The text of every file of one's own that makes the suite `name`, by path; none for a suite from here."""
     if not name.endswith(".toml"):

@@ -15,8 +15,9 @@ import numpy as np
 from estimator.interface import Array
 from sim.clock import Rates
 from sim.log import Log, Phase
+from sim.loop import sense
 from sim.magnetic_field import field_e_ut
-from sim.motion.prescribed_plant import CALM, Kinematics, motion_rows, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics, Motion, PrescribedPlant, rotation_from_euler
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
 from sim.rng import stream
 from sim.sensors import accelerometer, allan, gyro
@@ -283,18 +284,19 @@ def check_rates(devices: Mapping[str, Any]) -> None:
             rates.steps_per_sample(kind, params.rate_hz)
 
 
-def fly(params: SuiteParams, motion: Any, seconds: float, rates: Rates, quiet: bool = False) -> Log:
-    """What the suite makes of `motion`; where `quiet`, without anything that is drawn tick by tick."""
-    log = Log.empty(rates.ticks(seconds))
-    log.truth[:] = motion_rows(motion, len(log), rates.dt_s, math.radians(LATITUDE_DEG))
-    suite = Suite(params, rates, SEED)
-    suite.reset(log)
-    if quiet:
-        drawn = suite.snapshot()
-        suite.restore(drawn._replace(noise=np.zeros_like(drawn.noise)))
-    for k in range(len(log)):
-        suite.measure(k)
-    return log
+def fly(params: SuiteParams, motion: Motion, seconds: float, rates: Rates, quiet: bool = False) -> Log:
+    """What the suite measures of `motion`; if `quiet`, without the errors drawn for each tick."""
+    suite = (_QuietSuite if quiet else Suite)(params, rates, SEED)
+    return sense(PrescribedPlant(motion, rates), suite, Log.empty(rates.ticks(seconds)))
+
+
+class _QuietSuite(Suite):
+    """Sensors without the errors that are drawn for each tick."""
+
+    def reset(self, log: Log) -> None:
+        super().reset(log)
+        drawn = self.snapshot()
+        self.restore(drawn._replace(noise=np.zeros_like(drawn.noise)))
 
 
 def exercise(devices: Mapping[str, Any]) -> Log:

@@ -11,8 +11,8 @@ import pytest
 
 from scenarios.harness.cli.app import run
 from scenarios.harness.commands import check as gate
-from scenarios.harness.commands import fly as single
 from scenarios.harness.commands.bench import STAGES
+from scenarios.harness.flight import Prepared
 from sim import recording
 from sim.log import Outcome
 
@@ -45,9 +45,9 @@ def ended_with(monkeypatch):
     """Makes the next flights end with another outcome than they had."""
 
     def patch(outcome: Outcome) -> None:
-        really = single.fly_config
+        really = Prepared.fly
         monkeypatch.setattr(
-            single, "fly_config", lambda *a, **k: replace(really(*a, **k), outcome=outcome, message="as told")
+            Prepared, "fly", lambda *a, **k: replace(really(*a, **k), outcome=outcome, message="as told")
         )
 
     return patch

@@ -212,7 +212,7 @@ def check(
     from scenarios.harness.commands import check as gate
     from scenarios.harness.gate import workers as crew
     from scenarios.harness.gate.ledger import Ledger
-    from scenarios.harness.preflight import in_time
+    from scenarios.harness.gate.preparing import in_time
 
     with reporting(json_) as report:
         with usage():
@@ -297,7 +297,7 @@ def compare(
     from scenarios.harness.commands import check as gate
     from scenarios.harness.commands import compare as comparing
     from scenarios.harness.gate import workers as crew
-    from scenarios.harness.preflight import in_time
+    from scenarios.harness.gate.preparing import in_time
 
     with reporting(json_) as report:
         with usage():

@@ -21,7 +21,6 @@ from estimator.instruments import Instruments
 from estimator.interface import AttitudeEstimator, Measurements
 from scenarios.harness.checks import Row
 from scenarios.harness.cli import console
-from scenarios.harness.fitted import suite_params
 from scenarios.harness.gate import guard
 from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
 from scenarios.harness.verdict import FAILED, SIMULATION_FAILED
@@ -31,6 +30,7 @@ from sim.flight_code import FlightCodeFailed, blaming, command_of, estimate_of
 from sim.log import Flight, Log, Outcome
 from sim.loop import fly, make_ready, power_up
 from sim.plant import InFlight
+from sim.sensors.fitting import suite_params
 from sim.sensors.known import data_sheets
 from sim.sensors.suite import Suite
 

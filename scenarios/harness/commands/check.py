@@ -13,11 +13,10 @@ from typing import Any
 from scenarios.harness.cli import console
 from scenarios.harness.cli import reports as cli_reports
 from scenarios.harness.config import LARGEST_SEED
-from scenarios.harness.flight import fly_scenario
+from scenarios.harness.flight import fly_scenario, prepare
 from scenarios.harness.gate.ledger import Ledger
 from scenarios.harness.gate.sources import decided_by, fingerprint
 from scenarios.harness.gate.workers import fly_each
-from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find, matching
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
@@ -77,14 +76,14 @@ def tasks(
             f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
         )
     all_changes = changes if estimator is None else {**changes, "estimator": estimator}
-    configs = [prepared(name, all_changes) for name in wanted]  # all of them, before anything is said
+    all_prepared = [prepare(name, all_changes) for name in wanted]  # all of them, before anything is said
     found = []
-    for name, (scenario, config) in zip(wanted, configs, strict=True):
-        console.warn_of_faults(name, config)
-        decides = decided_by(name, config) | {"changes": recording.plain(changes)} if keyed else {}
+    for name, prepared in zip(wanted, all_prepared, strict=True):
+        console.warn_of_faults(name, prepared.config)
+        decides = decided_by(name, prepared) | {"changes": recording.plain(changes)} if keyed else {}
         for seed in seeds:
             key = fingerprint(decides | {"seed": seed}) if keyed else ""
-            found.append(Task(name, seed, config.estimator, changes, scenario.name, key))
+            found.append(Task(name, seed, prepared.config.estimator, changes, prepared.scenario.name, key))
     console.note_left_out(left_out)
     return found
 

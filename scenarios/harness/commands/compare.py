@@ -20,23 +20,20 @@ from rich.text import Text
 from estimator import ESTIMATORS
 from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import Array, HeadingReference, Measurements
-from scenarios.harness.aboard import flight_code, instruments_of
 from scenarios.harness.cli import console
 from scenarios.harness.config import FlightConfig
-from scenarios.harness.fitted import suite_params
-from scenarios.harness.flight import fly_config, fly_scenario
+from scenarios.harness.flight import Prepared, fly_scenario, prepare_config
+from scenarios.harness.flight import prepare as prepare_flight
 from scenarios.harness.gate.workers import fly_each
 from scenarios.harness.metrics import Series, heading_error_deg, inclination_error_deg, rms
 from scenarios.harness.plugins import (
     PluginError,
     equipped,
-    heading_reference_of,
     load_estimator,
     shared_settings,
     uses_of,
     without,
 )
-from scenarios.harness.preflight import prepared, unheard_settings
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, judge
@@ -281,16 +278,16 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     shared = {key: value for key, value in changes.items() if not key.startswith(PREFIX)}
     of_each = shared_settings(names, settings)
     changes_of = {name: shared | {PREFIX + key: value for key, value in of_each[name].items()} for name in names}
-    configs = [prepared(scenario, {**changes_of[name], "estimator": name}, lenient=True)[1] for name in names]
-    made = {name: flight_code(of_it).estimator.code for name, of_it in zip(names, configs, strict=True)}
-    console.warn_of_faults(scenario, configs[0])
-    references = {name: heading_reference_of(estimator) for name, estimator in made.items()}
-    instruments = {name: given(estimator, configs[0]) for name, estimator in made.items()}
-    notes = (*without(of_each, settings), *_unheard(names, configs))
-    return Plan(scenario, find(scenario), configs[0], names, tuple(seeds), changes_of, notes, references, instruments)
+    prepared = {name: prepare_flight(scenario, {**changes_of[name], "estimator": name}, lenient=True) for name in names}
+    first = prepared[names[0]]
+    console.warn_of_faults(scenario, first.config)
+    references = {name: of_it.heading_reference for name, of_it in prepared.items()}
+    instruments = {name: given(of_it) for name, of_it in prepared.items()}
+    notes = (*without(of_each, settings), *_unheard(prepared))
+    return Plan(scenario, first.scenario, first.config, names, tuple(seeds), changes_of, notes, references, instruments)
 
 
-def _unheard(names: Sequence[str], configs: Sequence[FlightConfig]) -> list[str]:
+def _unheard(prepared: Mapping[str, Prepared]) -> list[str]:
     """A line for each property of the instruments that is set and that some estimators have no parameter for.
 
     Raises
@@ -298,13 +295,12 @@ def _unheard(names: Sequence[str], configs: Sequence[FlightConfig]) -> list[str]
     ValueError      one line: one that none of them has, nor the autopilot
     """
     lines = []
-    unheard = {name: unheard_settings(config) for name, config in zip(names, configs, strict=True)}
-    for setting in configs[0].instruments:
-        deaf = [name for name in names if setting in unheard[name]]
-        if len(deaf) == len(names):
-            raise ValueError(f"{setting} = {configs[0].instruments[setting]!r}: none of them has such a parameter")
+    for setting, value in next(iter(prepared.values())).config.instruments.items():
+        deaf = [name for name, of_it in prepared.items() if setting in of_it.unheard]
+        if len(deaf) == len(prepared):
+            raise ValueError(f"{setting} = {value!r}: none of them has such a parameter")
         if deaf:
-            takers = ", ".join(name for name in names if name not in deaf)
+            takers = ", ".join(name for name in prepared if name not in deaf)
             lines.append(f"{setting} is set for {takers}; without that parameter: {', '.join(deaf)}")
     return lines
 
@@ -350,11 +346,10 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None], *, limit_
     return Comparison(plan.scenario, plan.config, plan.seeds, tuple(entrants), plan.notes)
 
 
-def given(estimator: object, config: FlightConfig) -> tuple[str, ...]:
-    """The instruments that are fitted in this flight and that `estimator` can make something of."""
-    suite = suite_params(config.suite, config.sensors, config.files)
-    fitted = {name for name in LETTERS if getattr(suite, name, None) is not None}
-    return tuple(name for name in uses_of(estimator, _UNKNOWN) if name in fitted)
+def given(prepared: Prepared) -> tuple[str, ...]:
+    """The instruments that are fitted in this flight and that its estimator uses."""
+    fitted = {name for name in LETTERS if getattr(prepared.suite, name, None) is not None}
+    return tuple(name for name in uses_of(prepared.estimator.code, _UNKNOWN) if name in fitted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,9 +362,8 @@ class _Timing:
 
     def fly(self) -> Cost:
         """Measure it; its flights are kept where it raises."""
-        config = FlightConfig.model_validate_json(self.config)
         try:
-            return cost(self.estimator, _measured(self.scenario, self.config), instruments_of(config))
+            return cost(self.estimator, *_measured(self.scenario, self.config))
         except (_NotTimed, ValueError) as problem:  # the latter of a script that asks for a longer flight
             return Cost(math.nan, None, str(problem))
 
@@ -379,9 +373,10 @@ class _Timing:
 
 
 @lru_cache(maxsize=1)
-def _measured(scenario: str, config: str) -> NDArray[Any]:
-    """Measurements of a flight."""
-    return fly_config(find(scenario), FlightConfig.model_validate_json(config), lenient=True).log.measured
+def _measured(scenario: str, config: str) -> tuple[NDArray[Any], Instruments]:
+    """Measurements of a flight, and what is known of its instruments."""
+    prepared = prepare_config(find(scenario), FlightConfig.model_validate_json(config), lenient=True)
+    return prepared.fly().log.measured, prepared.instruments
 
 
 def _costs(plan: Plan, failed: Container[str], limit_s: float | None) -> dict[str, Cost]:

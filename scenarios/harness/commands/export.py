@@ -10,11 +10,11 @@ from typing import Any
 
 from scenarios.harness.cli import console
 from scenarios.harness.commands import export_text
-from scenarios.harness.fitted import suite_params
 from sim import gps_messages, recording
 from sim.gps_messages import Accuracy, Fixes
 from sim.log import Flight
 from sim.outside import files as strangers
+from sim.sensors.fitting import suite_params
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,9 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from scenarios.harness.aboard import flight_code
-from scenarios.harness.config import FlightConfig
-from scenarios.harness.registry import find
+from scenarios.harness.flight import Prepared
 from sim.recording import versions
 
 _ROOT = Path(__file__).resolve().parents[3]
@@ -28,15 +26,15 @@ _KINDS = {".py", ".toml", ".xml"}
 _PEERS = ("scipy", "ahrs", "imufusion", "vqf")  # packages of others that our estimators fly with
 
 
-def decided_by(scenario: str, config: FlightConfig) -> dict[str, Any]:
-    """Everything that decides the flight of a scenario, by name or file, under the resolved `config`."""
-    code = flight_code(config)
+def decided_by(named: str, prepared: Prepared) -> dict[str, Any]:
+    """Everything that decides a flight; `named` is its scenario as it was named, which may be a file."""
+    config = prepared.config
     return {
-        "scenario": find(scenario).name,
-        "scenario_file": _of_file(Path(scenario)) if scenario.endswith(".py") else "",
+        "scenario": prepared.scenario.name,
+        "scenario_file": _of_file(Path(named)) if named.endswith(".py") else "",
         "config": config.model_dump(mode="json"),
-        "estimator": _of_code(config.estimator, type(code.estimator.code).__module__),
-        "autopilot": _of_code(config.autopilot, type(code.autopilot.code).__module__),
+        "estimator": _of_code(config.estimator, type(prepared.estimator.code).__module__),
+        "autopilot": _of_code(config.autopilot, type(prepared.autopilot.code).__module__),
         "wingslevel": _ours(),
         "versions": _versions(),
     }
