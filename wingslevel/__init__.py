@@ -53,11 +53,11 @@ if TYPE_CHECKING:
         MagSample,
         Measurements,
     )
-    from wingslevel._arrays import Attitudes, estimate
     from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning
     from wingslevel._flight import Flight
     from wingslevel._flying import fly, load
     from wingslevel._names import autopilots, estimators, scenarios
+    from wingslevel._pages import export, view
 
     __version__: str
 
@@ -65,13 +65,14 @@ _hidden.require_ours()
 
 _HOMES = {
     "estimator.interface": (
-        "AirData", "AttitudeEstimate", "AttitudeEstimator", "GpsFix", "Health", "ImuSample", "MagSample", "Measurements",
+        "AirData", "AttitudeEstimate", "AttitudeEstimator", "GpsFix", "Health", "ImuSample", "MagSample",
+        "Measurements",
     ),
-    "wingslevel._arrays": ("Attitudes", "estimate"),
     "wingslevel._errors": ("Interrupted", "WingslevelError", "WingslevelWarning"),
     "wingslevel._flight": ("Flight",),
     "wingslevel._flying": ("fly", "load"),
     "wingslevel._names": ("autopilots", "estimators", "scenarios"),
+    "wingslevel._pages": ("export", "view"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -79,7 +80,6 @@ __all__ = [
     "AirData",
     "AttitudeEstimate",
     "AttitudeEstimator",
-    "Attitudes",
     "Flight",
     "GpsFix",
     "Health",
@@ -91,11 +91,12 @@ __all__ = [
     "WingslevelWarning",
     "__version__",
     "autopilots",
-    "estimate",
     "estimators",
+    "export",
     "fly",
     "load",
     "scenarios",
+    "view",
 ]
 
 

@@ -160,13 +160,18 @@ class Flight:
         return self._recorded.log.flown
 
     @property
+    def heading_reference(self) -> str:
+        """What the heading of the estimator converges to, and is judged against: "course" or "nose"."""
+        return self._recorded.heading_reference
+
+    @property
     def inclination_error_deg(self) -> Array:
         """Shape (N,): angle between the estimated and the true vertical; NaN where it is not judged."""
         return self._errors[0]
 
     @property
     def heading_error_deg(self) -> Array:
-        """Shape (N,), -180..180: against what the heading of the estimator converges to; NaN where it is not judged."""
+        """Shape (N,), 0..180: against the true `heading_reference`; NaN where it is not judged."""
         return self._errors[1]
 
     @cached_property

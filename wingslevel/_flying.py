@@ -6,9 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-from typing_extensions import Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from wingslevel._conditions import Conditions, Estimator, changes_of, plain, with_conditions
 from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning, one_line
@@ -16,8 +14,8 @@ from wingslevel._flight import Flight, rows_of
 from wingslevel._progress import Progress, progress_of
 
 if TYPE_CHECKING:
+    from scenarios.harness.config import FlightConfig
     from scenarios.harness.scenario import Scenario
-    from sim.log import Flight as Recorded
     from sim.log import Log
 
 
@@ -53,24 +51,23 @@ def fly(
     WingslevelError     one line: a scenario, an estimator or a value that cannot be; nothing has been flown then
     Interrupted         Ctrl-C; its `result` is the flight up to there
     """
-    from scenarios.harness.flight import fly_scenario
-    from scenarios.harness.registry import find
-    from scenarios.harness.scenario import Scenario
+    from scenarios.harness.flight import prepare
     from scenarios.harness.verdict import judge
     from sim import recording
     from sim.log import Outcome
 
     changes = changes_of(conditions, params)
     with one_line(), _timed(timeout):
-        found = scenario if isinstance(scenario, Scenario) else find(os.fspath(scenario))
-        with progress_of(progress, f"flying {found.name}", "s") as advance:
+        prepared = prepare(plain(scenario), changes, seed=plain(seed), estimator=plain(estimator))
+        _warn_of_faults(prepared.config)
+        with progress_of(progress, f"flying {prepared.scenario.name}", "s") as advance:
 
             def watch(log: "Log", n_rows: int) -> None:
-                advance(float(log.truth["t_s"][n_rows - 1]), len(log) * float(log.truth["t_s"][0]))
+                dt_s = 1.0 / prepared.config.rates.imu_hz
+                advance(n_rows * dt_s, len(log) * dt_s)
 
-            flown = fly_scenario(found, changes, seed=plain(seed), estimator=plain(estimator), watch=watch)
-    _warn_of_faults(flown)
-    judged = judge(found, flown)
+            flown = prepared.fly(watch)
+    judged = judge(prepared.scenario, flown)
     flown = replace(flown, manifest={**flown.manifest, "verdict": recording.plain(judged.rows)})
     flight = Flight(flown, judged)
     if flown.outcome == Outcome.INTERRUPTED:
@@ -92,12 +89,10 @@ def _timed(timeout: float | None) -> Iterator[None]:
         raise WingslevelError(f"timeout = {timeout!r} s: over before the flight began") from None
 
 
-def _warn_of_faults(flown: "Recorded") -> None:
+def _warn_of_faults(config: "FlightConfig") -> None:
     """Warn of faults for which the flight is too short."""
-    from scenarios.harness.config import FlightConfig
     from scenarios.harness.config.faults import never_met
 
-    config = FlightConfig(**flown.manifest["config"])
     for fault in never_met(config.faults, config.held_s, config.duration_s):
         lasts = f"the flight lasts from {-config.held_s:g} s to {config.duration_s:g} s after the release"
         warnings.warn(f"fault {fault} is never met: {lasts}", WingslevelWarning, stacklevel=3)
