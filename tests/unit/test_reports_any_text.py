@@ -90,7 +90,7 @@ def test_terminal_of_any_text_prints_it_and_obeys_none(text: str, monkeypatch) -
     """No control character gets through to 60 columns of ASCII; the numbers do."""
     monkeypatch.setenv("COLUMNS", "60")
     with terminal() as stream:
-        gate.tell(verdict_with(text))
+        gate.print_report(verdict_with(text))
         console.out().print(console.table("t", ("", "n"), [[text, "5678"]], wrapping=(0,)))
     shown = printed(stream)
     assert all(c == "\n" or c.isprintable() for c in shown)
