@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from estimator.interface import G_M_S2
 from scenarios.harness.cli import console
 from sim.aeroplane import performance
 from sim.aeroplane.derivatives import Airframe, coefficients, lanchester, textbook
@@ -56,7 +57,7 @@ class Handbook:
 
     @property
     def wing_loading_n_m2(self) -> float:
-        return self.frame.mass_kg * 9.80665 / self.frame.area_m2
+        return self.frame.mass_kg * G_M_S2 / self.frame.area_m2
 
     def to_json(self) -> dict[str, Any]:
         """The page as numbers named with their units; None for what does not exist."""
