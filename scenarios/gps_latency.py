@@ -79,17 +79,17 @@ SCENARIO = Scenario(
 )
 
 
-def _late(ending: str, latency_s: float, *checks: Check, fails: bool = False, **changes: Any) -> Scenario:
-    """A variant with a turn."""
+def _late(ending: str, latency_s: float, changes: dict[str, Any], *checks: Check, fails: bool = False) -> Scenario:
+    """A variant with a turn, and with `changes` besides; whether its estimator `fails`, as the paper predicts."""
     changes |= {"gps.latency_s": latency_s, "manoeuvre.turn_deg": 90.0, "duration_s": 100.0}
     return SCENARIO.varied(ending, VARIANTS[ending], changes, checks=(SURVIVED, *checks), expected_to_fail=fails)
 
 
 SCENARIOS = (
     SCENARIO,
-    _late("ms_200", 0.2, _heading(5.0), _inclination(4.0), **{"rates.gps_hz": 5.0}),
-    _late("s_1", 1.0, _heading(10.0), _inclination(4.0), **{"rates.gps_hz": 1.0}),
-    _late("s_3", 3.0, _lost(15.0), _inclination(10.0), fails=True),
-    _late("told_3", 3.0, _heading(10.0), _inclination(6.0), withheld=()),
-    _late("told_12", 12.0, _heading(15.0), _inclination(5.0), withheld=()),
+    _late("ms_200", 0.2, {"rates.gps_hz": 5.0}, _heading(5.0), _inclination(4.0)),
+    _late("s_1", 1.0, {"rates.gps_hz": 1.0}, _heading(10.0), _inclination(4.0)),
+    _late("s_3", 3.0, {}, _lost(15.0), _inclination(10.0), fails=True),
+    _late("told_3", 3.0, {"withheld": ()}, _heading(10.0), _inclination(6.0)),
+    _late("told_12", 12.0, {"withheld": ()}, _heading(15.0), _inclination(5.0)),
 )
