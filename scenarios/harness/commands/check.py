@@ -71,7 +71,7 @@ def tasks(
     """
     wanted, left_out = matching(names or ["*"]), []
     if estimator is not None:
-        left_out = [name for name in wanted if name not in names and find(name).shows_failure]
+        left_out = [name for name in wanted if name not in names and find(name).expected_to_fail]
         wanted = [name for name in wanted if name not in left_out]
         if not wanted:
             raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")

@@ -77,7 +77,7 @@ def _heading(figure: Any, comparison: Comparison, height: float) -> None:
     )
     wind = f"wind {config.air.wind_m_s:g} m/s, turbulence W20 {config.air.turbulence_w20_m_s:g} m/s"
     facts = (
-        plotted(comparison.scenario.told_as, 120),
+        plotted(comparison.scenario.summary, 120),
         f"{n} {'seed' if n == 1 else 'seeds'}, the same for each",
         plotted(config.aircraft.replace("_", " ")),
         f"sensors {plotted(Path(config.suite).stem)}",
