@@ -11,6 +11,7 @@ from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.commands.catalogue import KINDS, ours
 from scenarios.harness.gate import guard
 from sim.outside.entry_points import OURS, Offer, ignored, offered
@@ -194,3 +195,18 @@ def print_listing(listing: Listing) -> None:
             console.out().print(console.name_table(title, lines))
     for note in listing.notes:
         console.line(f"note        {note}", "yellow")
+
+
+def run(kind: str | None, names: Sequence[str], *, params: bool, json_: str | None) -> None:
+    """Do what the command line asks for."""
+    with reporting(json_) as report:
+        if params:
+            with usage():
+                about = parameters(kind, names)
+            report({"estimators": about})
+            print_parameters(about)
+            return
+        with usage():
+            found = listing(kind, names)
+        report(found.to_json())
+        print_listing(found)
