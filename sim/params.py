@@ -4,7 +4,7 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
-from types import UnionType
+from types import MappingProxyType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from sim.outside.wording import brief
@@ -51,15 +51,19 @@ def words_of(name: str) -> str:
     return f"{words}, body axes" if f"_b{end}" in name else words
 
 
-def near_misses(name: str, names: Iterable[str]) -> str:
-    """The end of a message about an unknown `name`: what it may have meant, or all there is."""
+def near_misses(name: str, names: Iterable[str], written: Mapping[str, str] = MappingProxyType({})) -> str:
+    """The end of a message about an unknown `name`: what it may have meant, or all there is.
+
+    written : how to write those that are written otherwise
+    """
     possible = sorted(names)
     slips = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.85)  # a key or two: nothing else is meant
     close = slips or difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
     if not close and len(possible) > _MOST_TOLD:
         head = f"{name.partition('.')[0]}."
         possible = [n for n in possible if n.startswith(head)] or _by_heads(possible)
-    return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
+    told = list(dict.fromkeys(written.get(each, each) for each in close or possible))
+    return f"did you mean {' or '.join(told)}?" if close else f"choose from {', '.join(told)}"
 
 
 def _by_heads(names: list[str]) -> list[str]:

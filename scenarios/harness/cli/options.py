@@ -36,7 +36,7 @@ EstimatorOption = Annotated[
 ]  # fmt: skip
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
+    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter: gps.latency_s=0.5, or my_filter.k_p=1 of an estimator."),
 ]
 WindOption = Annotated[
     str | None,
@@ -152,7 +152,7 @@ SeveralOption = Annotated[
     ),
 ]  # fmt: skip
 ParameterOption = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators, k_p=1, or of one, my_filter.k_p=1.")
 ]
 LogEstimatorsOption = Annotated[
     str,

@@ -13,9 +13,9 @@ from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.gate import guard
 from scenarios.harness.logs.recorded import RecordedLog
-from scenarios.harness.plugins import shared_settings, without
 from scenarios.harness.recorder import record
 from scenarios.harness.replay import Replayed, Window, as_flight, gone, judged_rows, known_to, make, replay, why_none
+from scenarios.harness.settings import PREFIX, lines_on_others, shared_settings
 from sim import recording
 from sim.outside.wording import file_name
 
@@ -96,7 +96,7 @@ def replay_log(
     window, params = window or Window(), params or {}
     if not names or len({name.rpartition(":")[2] for name in names}) < len(names):
         raise ValueError(f"--estimator {','.join(names)}: name at least one, name each one once")
-    settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
+    settings = {name.removeprefix(PREFIX).removeprefix("instruments."): v for name, v in params.items()}
     of_each, withheld = shared_settings(names, settings), property_names(withheld)
     for name in names:
         make(name, of_each[name])
@@ -125,7 +125,7 @@ def replay_log(
         folders[replayed.estimator] = folder
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
-    notes = (*without(of_each, settings), *_ground_too(log))
+    notes = (*lines_on_others(of_each, settings), *_ground_too(log))
     return Replays(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
 
 
