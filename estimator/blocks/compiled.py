@@ -95,7 +95,7 @@ class Compiled(Generic[P]):
         """
         self._state.fill(0)
         s = self._state[0]
-        params: Params = self.params or Params()
+        params = self.params if isinstance(self.params, Params) else Params()
         for name in numbers_of(type(params)):
             s[name] = getattr(params, name)
         if isinstance(params, MagnetometerParams):

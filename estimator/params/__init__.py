@@ -17,6 +17,7 @@ PARAMETERS: dict[str, str] = {
     "gps_velocity_nose": "estimator.params.gps_velocity:NOSE",
     "gps_velocity_magnetometer": "estimator.params.gps_velocity:MAGNETOMETER",
     "ins_ekf": "estimator.params.ins_ekf:InsEkfParams",
+    "complementary": "estimator.complementary:ComplementaryParams",  # to be copied whole: it loads the compiler
     "starlino": "estimator.params.starlino:StarlinoParams",
     "dilshad": "estimator.params.dilshad:DilshadParams",
     "peer_madgwick": "estimator.params.peers:MadgwickParams",

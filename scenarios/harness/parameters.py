@@ -83,8 +83,8 @@ def documented(cls: type) -> dict[str, tuple[str, str, str, str]]:
     for owner in cls.__mro__:
         for name, unit, text in _entries(owner.__doc__ if isinstance(owner.__doc__, str) else ""):
             effects = _EFFECTS.match(text)
-            parts = effects.group("meaning", "raised", "lowered") if effects else (text, "", "")
-            found.setdefault(name, (unit, *parts))
+            meaning, raised, lowered = effects.group("meaning", "raised", "lowered") if effects else (text, "", "")
+            found.setdefault(name, (unit, meaning, raised, lowered))
     return found
 
 

@@ -106,7 +106,7 @@ def test_names_of_this_project_do_not_load_the_compiler() -> None:
     """A list of all parameters is printed at once."""
     code = (
         "import sys; from estimator.params import PARAMETERS; from scenarios.harness.parameters import *\n"
-        "for name in PARAMETERS: estimator_parameters(name)\n"
+        "for name in PARAMETERS.keys() - {'complementary'}: estimator_parameters(name)\n"
         "sys.exit('numba' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
