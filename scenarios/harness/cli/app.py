@@ -50,7 +50,7 @@ from sim.outside.blame import show_traceback, show_tracebacks
 from sim.outside.signals import listening
 from sim.outside.wording import described
 
-FLIGHTS = Path("flights")  # where recordings go unless told otherwise
+FLIGHTS = Path("flights")  # where recordings go by default
 
 app = typer.Typer(
     name="wingslevel",

@@ -1,4 +1,4 @@
-"""What there is to fly, told without importing any of it: a listing must not wait for compilers and engines."""
+"""Everything that can be named, listed without importing any of it: a listing must not wait for a compiler."""
 
 import ast
 import tomllib
@@ -11,7 +11,7 @@ _ROOT = Path(__file__).resolve().parents[3]
 
 
 def catalogue() -> dict[str, dict[str, str]]:
-    """Everything that has a name on the command line: kind -> name -> one line about it, names in order."""
+    """Everything that has a name on the command line: kind -> name -> one-line description, sorted."""
     found = {
         "scenarios": {n: told for p in (_ROOT / "scenarios").glob("[!_]*.py") for n, told in _scenarios(p).items()},
         "estimators": {name: _about(where) for name, where in plugins.estimators().items()},
@@ -48,7 +48,7 @@ def _first_line(node: ast.Module | ast.ClassDef) -> str:
 
 
 def _about(where: str) -> str:
-    """First line of the docstring of the class at ``module:Class``; the place itself where it is not ours."""
+    """First line of the docstring of the class at ``module:Class``; the place itself if it is not ours."""
     module, _, name = where.partition(":")
     path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
     if not path.is_file():

@@ -40,7 +40,7 @@ def subject(name: str) -> Subject:
     known = [*part_names(), *SUITES, "perfect"]
     if _plain(name) not in map(_plain, known):
         hint = near_misses(name, known)
-        raise ValueError(f"unknown part or suite {name!r}: {hint} (one's own: path/to/part.toml)")
+        raise ValueError(f"unknown part or suite {name!r}: {hint} (your own: path/to/part.toml)")
     return _part(load_part(name))
 
 
