@@ -26,7 +26,7 @@ from estimator.rotation import heading_error_rad, inclination_error_rad, rotatio
 from scenarios.harness.cli import console
 from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
-from scenarios.harness.logs.validity import INTERVALS, LONGEST_S
+from scenarios.harness.logs.validity import INTERVALS, LONGEST_S, latest
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
 from scenarios.harness.plugins import Equipped, PluginError, equipped, heading_reference_of, learnt
 from sim.events import events_of
@@ -255,7 +255,7 @@ def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bo
         return judged, _why_unknown(log, reference.name)
     if reference.kind == "firmware":
         return judged, ""
-    if "gps" in log.instruments and window.airborne_m_s > 0.0:
+    if "gps" in log.sensors and window.airborne_m_s > 0.0:
         judged &= flying(rows, window.airborne_m_s)
         if not judged.any():
             fastest = float(rows["gps_speed_m_s"][rows["gps_new"] > 0].max(initial=0.0))
@@ -327,7 +327,7 @@ def as_flight(log: RecordedLog, replayed: Replayed, window: Window) -> Flight:
         "scenario": f"replay of {log.name}",
         "estimator": replayed.estimator,
         "reference": reference,
-        "instruments": log.instruments,
+        "sensors_in_log": log.sensors,
         "repairs": log.repairs,
         "ledger": log.ledger.to_json(),
         "known": to_json(Instruments(log.known)),
@@ -425,7 +425,7 @@ def _copied(on_ground: ImuSample | None) -> ImuSample | None:
 
 def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:
     """Fill the table of the truth with what a log knows of it: the reference attitude, and the way by GPS."""
-    rows, n = log.rows, len(log.rows)
+    rows = log.rows
     truth["t_s"] = rows["t_s"]
     truth["phase"] = Phase.FLYING
     for name in _UNKNOWN:
@@ -435,7 +435,7 @@ def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:
     if log.reference is not None:
         known = log.reference.known
         if known.any():  # the last known attitude, before the first one that
-            last = np.maximum.accumulate(np.where(known, np.arange(n), -1))
+            last = latest(known)
             truth["R_eb"] = log.reference.R_eb[np.where(last < 0, np.argmax(known), last)]
     fixes = np.flatnonzero(rows["gps_new"])
     for table, measured in (("p_e_m", "gps_p_e_m"), ("v_e_m_s", "gps_v_e_m_s")):

@@ -137,7 +137,7 @@ def test_recording_of_ours_comes_back_bit_for_bit(log, tmp_path):
     for path in (folder, folder / recording.PARQUET):
         found = logs.read(path)
         assert found.rows.tobytes() == log.rows.tobytes()
-        assert (found.name, found.reference.kind, found.instruments) == ("flight", "truth", log.instruments)
+        assert (found.name, found.reference.kind, found.sensors) == ("flight", "truth", log.sensors)
         np.testing.assert_array_equal(found.reference.R_eb, flown.truth["R_eb"])
     (tmp_path / "empty").mkdir()
     with pytest.raises(LogError, match="no recording at"):

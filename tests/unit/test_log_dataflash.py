@@ -121,7 +121,7 @@ def test_log_is_read_as_it_was_written(logged, demand_same_rows, write):
     """Every column to the resolution of its format, every arrival in its tick, the simulator's attitude as truth."""
     log = write(Writer(TODAY).log(messages(logged)))
     demand_same_rows(log.rows, logged.expected(stamped=False), RESOLUTION)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     assert (log.repairs, log.notes) == ((), (ONE_READ,))
     assert log.place == pytest.approx((47.4, 8.5), rel=0, abs=1e-7)
     assert log.reference is not None
@@ -174,7 +174,7 @@ def test_log_of_2013_is_read_as_it_was_written(logged, demand_same_rows, write):
     # Speed in whole cm/s, course in hundredths of a degree of 30 m/s.
     coarse = {"gps_speed_m_s": 0.0051, "gps_course_rad": 1e-4, "gps_v_e_m_s": 0.008}
     demand_same_rows(log.rows, expected, RESOLUTION | coarse)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer")
     assert log.reference is not None
     assert (log.reference.kind, log.reference.name) == ("filter", "ATT in flight.BIN")
     np.testing.assert_allclose(log.reference.R_eb, logged.R_eb, rtol=0, atol=1.6e-4)  # 0.005 degrees of each angle
@@ -226,7 +226,7 @@ def test_gyro_and_accelerometer_of_their_own_meet_at_the_times_of_the_gyro(logge
     assert log.repairs == ("column AccX (force.x): 1 without a number left out, first GYR 1000",
                            "column AccY (force.y): 1 without a number left out, first GYR 1000",
                            "column AccZ (force.z): 1 without a number left out, first GYR 1000")  # fmt: skip
-    assert log.instruments == ("gyro", "accelerometer")
+    assert log.sensors == ("gyro", "accelerometer")
 
 
 def test_fix_of_less_than_three_dimensions_and_sick_sensors_are_not_used(logged, write):

@@ -193,10 +193,10 @@ def test_file_without_a_header_needs_names_in_a_map(held, write):
         (lambda lines: [lines[0].replace("gx", "gx (counts)"), *lines[1:]],
          r'no column for gyro\.x.*one in counts as "gx \(counts\)" = \{ is = "gyro\.x"'),
         (lambda lines: [lines[0].replace("vn", "gyro_x").replace("ve", "gyro_y").replace("roll", "gyro_z"),
-                        *lines[1:]], r"gyro\.x may be gx or gyro_x: say which in a column map"),
+                        *lines[1:]], r"gyro\.x may be gx or gyro_x: choose one in a column map"),
         (lambda _: ["hello", "1", "2"], "no columns in it, the first line is 'hello'"),
         (lambda lines: [lines[0].replace("gy", "gx"), *lines[1:]], "two columns are named 'gx'"),
-        (lambda _: ["a,b", "1,2", "3,4"], "no column whose name is understood; it has a, b"),
+        (lambda _: ["a,b", "1,2", "3,4"], "no column name is recognised; it has a, b"),
         (lambda lines: ["recorded", *lines[:1]], "line 2: 12 cells; the header has 1"),
     ],
 )  # fmt: skip

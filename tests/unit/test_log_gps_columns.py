@@ -134,7 +134,7 @@ def test_gps_without_a_velocity_is_in_the_ledger(held, read):
     log = read({"lat": latitude, "lon": longitude})
     entry = log.ledger["gps"]
     assert (entry.read, entry.used, entry.left_out) == (50, 0, {"without a velocity": 50})
-    assert log.instruments == ("gyro", "accelerometer")
+    assert log.sensors == ("gyro", "accelerometer")
     assert any("GPS without a velocity" in line for line in log.repairs)
 
 

@@ -80,7 +80,7 @@ def test_messages_of_ardupilot_become_the_rows_of_the_flight(tmp_path, matrices,
     expected["gps_t_s"][expected["gps_valid"] > 0] = np.nan
     expected["gps_valid"][logged.t_us >= matrices["GPS"][-1, 1]] = 0
     demand_same_rows(log.rows, expected, {"gps_p_e_m": 1e-5})
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     assert log.reference is not None
     np.testing.assert_allclose(log.reference.R_eb, logged.R_eb, rtol=0, atol=1e-9)
     assert log.known["gps_stamped"].value is False
@@ -192,7 +192,7 @@ def test_accelerometer_with_times_of_its_own_is_interpolated(tmp_path, held):
         (b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + b" " * 80, r"version 7\.3 \(HDF5\): save it again.*'-v7'"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), r"version 7\.3 \(HDF5\): save it again.*'-v7'"),
         ({"a": "words"}, r"no column of numbers; it has a \(str\)"),
-        ({"data": np.ones((9, 7))}, r'no column whose name is understood; it has data\[0\] to \[6\].*as "name\[0\]"'),
+        ({"data": np.ones((9, 7))}, r'no column name is recognised; it has data\[0\] to \[6\].*as "name\[0\]"'),
         ({"t": np.arange(9.0), "gyro": np.ones((9, 3))},
          r"no column for force\.x, .*; it has t, gyro\[0\] to \[2\]: name"),
         ({"t": np.arange(9.0), "g1": {"gyro": np.ones((9, 3))}, "g2": {"gyro": np.ones((9, 3))}},

@@ -63,7 +63,7 @@ def test_columns_become_rows(write):
     np.testing.assert_allclose(log.rows["force_b_m_s2"], FORCE, rtol=0, atol=1e-7)
     assert log.reference is not None
     np.testing.assert_allclose(log.reference.R_eb, R_EB, rtol=0, atol=1e-7)
-    assert (log.instruments, log.repairs) == (("gyro", "accelerometer", "gps"), ())
+    assert (log.sensors, log.repairs) == (("gyro", "accelerometer", "gps"), ())
 
 
 def test_fix_arrives_where_its_values_change(write):
@@ -136,7 +136,7 @@ def test_map_that_comes_with_the_package_fits_by_itself(tmp_path):
     savemat(tmp_path / "f.mat", {"flight_data": record})
     log = logs.read(tmp_path / "f.mat")
     np.testing.assert_allclose(log.rows["mag_b_ut"][-1], [100.0, -100.0, -100.0], rtol=1e-12)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
 
 
 def test_words_are_left_alone_in_columns_that_nobody_asked_for(write):

@@ -116,7 +116,7 @@ def test_log_is_read_as_it_was_written(logged, demand_same_rows, write):
     """Every column to the resolution of floats, every arrival in its tick, the simulator's attitude as truth."""
     log = write(ulog(messages(logged)))
     demand_same_rows(log.rows, expected_of(logged), RESOLUTION)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     assert log.repairs == ()
     assert log.place == pytest.approx((47.4, 8.5), rel=0, abs=1e-9)
     assert log.reference is not None
@@ -156,7 +156,7 @@ def test_log_of_2017_is_read_as_it_was_written(logged, demand_same_rows, write):
     log = write(ulog(told, topics))
     # The interval is a float of 0.02 s; 1e-7 degrees are 11 mm.
     demand_same_rows(log.rows, expected, RESOLUTION | {"dt_s": 2e-9, "gps_p_e_m": 0.02})
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer")
 
 
 def test_inertial_unit_is_chosen_by_its_number(logged, demand_same_rows, write):

@@ -55,7 +55,7 @@ class Told:
             "log": self.log.name,
             "rows": len(rows),
             "length_s": float(rows["t_s"][-1] - rows["t_s"][0] + rows["dt_s"][0]),
-            "instruments": list(self.log.instruments),
+            "sensors_in_log": list(self.log.sensors),
             "reference": self.log.reference.name if self.log.reference else None,
             "reference_kind": self.log.reference.kind if self.log.reference else None,
             "repairs": list(self.log.repairs),
@@ -144,7 +144,7 @@ def tell(told: Told) -> None:
     """The log, what was repaired in it, the table, and where the recordings are."""
     out, log = console.out(), told.log
     length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
-    console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}")
+    console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.sensors)}")
     for line in log.notes:
         console.line(f"note        {line}")
     for line in log.repairs:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness.logs import accounts, checks, column_map, foreign
+from scenarios.harness.logs import checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
 from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog
 from sim.outside import files
@@ -77,7 +77,7 @@ def _against(log: RecordedLog, path: Path) -> RecordedLog:
     """`log` with the attitudes of the file at `path` at the times of its rows."""
     from scenarios.harness.logs import reference_file
 
-    rows_s, ledger, repairs = log.rows["t_s"], accounts.without(log.ledger, "reference"), list(log.repairs)
+    rows_s, ledger, repairs = log.rows["t_s"], log.ledger.without("reference"), list(log.repairs)
     reader = _module(path.name.lower(), _BY_MAP)
     kind: reference_file.Kind = "filter"
     try:
@@ -91,7 +91,7 @@ def _against(log: RecordedLog, path: Path) -> RecordedLog:
             R_eb, kind = reference_file.of_log(path, other, rows_s, ledger)
         found = reference_file.reference(R_eb, kind, path)
     except NothingToScore as nothing:
-        ledger = accounts.without(log.ledger, "reference")
+        ledger = log.ledger.without("reference")
         ledger.read("reference", nothing.read)
         ledger.leave_out("reference", nothing.read, nothing.reason)
         unknown = np.full((len(rows_s), 3, 3), np.nan)

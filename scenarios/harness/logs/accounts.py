@@ -107,16 +107,3 @@ def reference(ledger: Ledger, known: NDArray[np.bool_], used: int) -> None:
         ledger.read("reference", int(known.sum()))
     ledger.leave_out("reference", int(known.sum()) - used, IN_ROW_LEFT_OUT)
     ledger.use("reference", used)
-
-
-def without(ledger: Ledger, stream: str) -> Ledger:
-    """A copy of the books without those of one stream."""
-    copy = Ledger()
-    for name, entry in ledger.items():
-        if name == stream:
-            continue
-        copy.read(name, entry.read)
-        copy.use(name, entry.used)
-        for reason, n in entry.left_out.items():
-            copy.leave_out(name, n, reason)
-    return copy

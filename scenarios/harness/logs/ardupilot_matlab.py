@@ -37,8 +37,7 @@ class MatlabMessages:
 
     def records(self, name: str) -> Records:
         """All records of that name; none where there are none."""
-        nothing = Records(name, 0, np.zeros(0, np.dtype([])), np.zeros(0, np.intp))
-        return self._records.get(name, nothing)
+        return self._records.get(name, Records.none(name))
 
     def instances(self, name: str) -> list[Records]:
         """The instances of a message; see `dataflash_records.instances`.  Those without any time are left out."""
@@ -52,10 +51,6 @@ class MatlabMessages:
     def column(self, records: Records, column: str) -> Array:
         """One column in our units (angles in degrees), shape (n,)."""
         return np.asarray(records.fields[column] * FIELDS.get(column, 1.0))
-
-    def table(self, records: Records, columns: tuple[str, ...]) -> Array:
-        """Columns in our units, shape (n, m)."""
-        return np.column_stack([self.column(records, column) for column in columns])
 
     @property
     def names(self) -> list[str]:

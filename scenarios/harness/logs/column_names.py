@@ -94,7 +94,7 @@ class Heard(NamedTuple):
 
     quantity: str
     factor: float
-    told: bool
+    unit_given: bool
     rank: int
     stem: str
 
@@ -144,14 +144,14 @@ def meanings(header: str, unit: str = "") -> list[Heard]:
                 continue
             factor = units.factor_of(spelled, _dimension(quantity)) if spelled else 1.0
             if factor is not None:
-                told = bool(spelled) or sign not in (1.0, -1.0)
-                worse = 0 if told or quantity != "time" else _UNTOLD  # of two clocks the one whose unit is given
-                found[quantity] = Heard(quantity, sign * factor, told, rank + worse, stem)
+                unit_given = bool(spelled) or sign not in (1.0, -1.0)
+                worse = 0 if unit_given or quantity != "time" else _UNTOLD  # of two clocks the one whose unit is given
+                found[quantity] = Heard(quantity, sign * factor, unit_given, rank + worse, stem)
     return sorted(found.values(), key=lambda heard: heard.rank)
 
 
 def _dimension(quantity: str) -> str:
-    return "number" if quantity.startswith("q#") else QUANTITIES[quantity].dimension
+    return "number" if quantity.startswith("q#") else QUANTITIES[quantity]
 
 
 def _named(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, int, str, float]]:
@@ -339,7 +339,7 @@ def automatic(
             if len(named) > 1:
                 rivals[quantity] = tuple(column for column, _ in named)
             for column, one in named[:1]:
-                chosen[column] = Meaning(one.quantity, one.factor, one.told)
+                chosen[column] = Meaning(one.quantity, one.factor, one.unit_given)
     return chosen, rivals
 
 

@@ -5,6 +5,7 @@ MAG holds the field after the firmware's corrections, with the offsets that it a
 RATE are those of the controller, filtered and corrected, and not what the gyro measured: not used.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import numpy as np
 from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import streams, tabular
+from scenarios.harness.logs import attitudes, streams
 from scenarios.harness.logs.ardupilot import FIX_3D, Parameters, year_of
 from scenarios.harness.logs.ardupilot_matlab import MatlabMessages
 from scenarios.harness.logs.dataflash_records import Clock, DataFlash, Records, own_time_s
@@ -50,7 +51,7 @@ def of_messages(records: DataFlash | MatlabMessages, imu: int | None = None) -> 
     field, compass = log.field()
     airspeed, pitot = log.airspeed()
     height = log.stream("BARO", ("Alt",), HEALTHY[2])
-    attitude = log.attitude()
+    attitude = streams.first_known(log.attitudes())
     notes = (f"only one of several instances is read: {'; '.join(log.others)}",) if log.others else ()
     messages = streams.Messages(
         inertial,
@@ -93,9 +94,13 @@ class _Log:
             self.others.append(f"{instances[0].name} {chosen.instance} (of {listed})")
         return chosen
 
+    def table(self, records: Records, columns: tuple[str, ...]) -> Array:
+        """Columns in our units, shape (n, m)."""
+        return np.column_stack([self.of.column(records, column) for column in columns])
+
     def made(self, records: Records, columns: tuple[str, ...]) -> Stream:
         """A stream of those columns, on the clock of the log."""
-        stream = Stream.of(records.name, np.zeros(len(records.fields)), self.of.table(records, columns))
+        stream = Stream.of(records.name, np.zeros(len(records.fields)), self.table(records, columns))
         t_s = own_time_s(records)
         if t_s is not None and self.clock.agrees(records, t_s):
             return _at_times(stream, t_s)
@@ -134,11 +139,11 @@ class _Log:
             raise LogError(f"{self.path}: {chosen.name} has no time; it has {', '.join(chosen.columns)}")
         self.clock = Clock(t_s, chosen.offsets)
         if found is whole:
-            stream = _at_times(Stream.of(chosen.name, t_s, self.of.table(chosen, GYRO + FORCE)), t_s)
+            stream = _at_times(Stream.of(chosen.name, t_s, self.table(chosen, GYRO + FORCE)), t_s)
             stream = _trusted(stream, chosen, HEALTHY[0])
         else:
             force = self.made(forces[chosen.instance], FORCE)
-            values = np.column_stack((self.of.table(chosen, GYRO), _at(t_s, force)))
+            values = np.column_stack((self.table(chosen, GYRO), _at(t_s, force)))
             stream = Stream.of(chosen.name, t_s, values)
         if 2 * np.sum(stream.why != "") > len(t_s):
             n, flags = np.sum(stream.why != ""), " ".join(c for c in HEALTHY[0] if c in chosen.columns)
@@ -210,30 +215,20 @@ class _Log:
             }
         return _trusted(stream, records, HEALTHY[2]).without(~used, off or f"{records.name}.U is 0: not in use"), {}
 
-    def attitude(self) -> tuple[Stream | None, Kind]:
-        """The attitude: the simulator's where there is one, else what was flown on, else that of the other filter.
-
-        Where none of them has a number, the first one that was logged.
-        """
-        empty: tuple[Stream | None, Kind] = None, "filter"
+    def attitudes(self) -> Iterator[tuple[Stream, Kind]]:
+        """The simulator's attitude, then the one flown on, then that of the other filter; see `streams.first_known`."""
         for name, kind in ATTITUDES:
             for columns, ours in ((("Q1", "Q2", "Q3", "Q4"), ("qw", "qx", "qy", "qz")),
                                   (("Roll", "Pitch", "Yaw"), ("roll", "pitch", "yaw"))):  # fmt: skip
                 found = [r for r in self.of.instances(name) if set(columns) <= set(r.columns)]
                 if not found:
                     continue
-                records = self._one(found, found[0])
-                stream = self.made(records, columns)
+                stream = self.made(self._one(found, found[0]), columns)
                 values = stream.values if ours[0] == "qw" else np.radians(stream.values)
-                R_eb = tabular.attitude(dict(zip(ours, values.T, strict=True)))
-                if R_eb is None:
-                    break
-                attitude = Stream(stream.name, stream.t_s, R_eb.reshape(-1, 9), stream.why)
-                if np.isfinite(R_eb).any():
-                    return attitude, kind
-                empty = empty if empty[0] else (attitude, kind)
+                R_eb = attitudes.attitude(dict(zip(ours, values.T, strict=True)))
+                if R_eb is not None:
+                    yield Stream(stream.name, stream.t_s, R_eb.reshape(-1, 9), stream.why), kind
                 break
-        return empty
 
 
 def _at_times(stream: Stream, t_s: Array) -> Stream:

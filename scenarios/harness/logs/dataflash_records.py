@@ -56,6 +56,11 @@ class Records:
     fields: NDArray[Any]
     offsets: NDArray[np.intp]
 
+    @classmethod
+    def none(cls, name: str) -> "Records":
+        """No record of a message."""
+        return cls(name, 0, np.zeros(0, np.dtype([])), np.zeros(0, np.intp))
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the fields."""
@@ -158,7 +163,7 @@ class DataFlash:
         """All records of that name; none where there are none."""
         kind = self._types.get(name)
         if kind is None:
-            return Records(name, 0, np.zeros(0, np.dtype([])), np.zeros(0, np.intp))
+            return Records.none(name)
         size, offsets = self._formats[kind].length - 3, np.array(self._offsets[kind], np.intp)
         block = np.frombuffer(self._raw, np.uint8)[offsets[:, None] + np.arange(3, 3 + size)]
         return Records(name, 0, np.ascontiguousarray(block).view(self._formats[kind].dtype)[:, 0], offsets)
@@ -175,10 +180,6 @@ class DataFlash:
         with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
             values = records.fields[column].astype(np.float64) / round(1.0 / own)
         return np.asarray(values * self._units.get((records.name, column), FIELDS.get(column, 1.0)))
-
-    def table(self, records: Records, columns: tuple[str, ...]) -> Array:
-        """Columns in our units, shape (n, m)."""
-        return np.column_stack([self.column(records, column) for column in columns])
 
     @property
     def names(self) -> list[str]:

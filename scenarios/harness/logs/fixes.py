@@ -33,11 +33,11 @@ class Reports:
 
 
 def reports(
-    table: Mapping[str, Array], told: frozenset[str], repairs: list[str], *, each: bool = False
+    table: Mapping[str, Array], units_given: frozenset[str], repairs: list[str], *, each: bool = False
 ) -> Reports | None:
     """The reports in the rows of `table`, which are in order of time; None without any column of them.
 
-    told : quantities whose unit is given: the others are judged by their values
+    units_given : quantities whose unit is given: the others are judged by their values
     each : every row is a report, none is held: the receiver has times of its own
     """
     names = [name for name in table if name.startswith("gps.") and name not in _FLAGS]
@@ -47,7 +47,7 @@ def reports(
     n = len(columns)
     read = np.isfinite(columns).any(axis=1) if each and "gps.new" not in table else _read(table, columns)
     lost = table["gps.fix"] < LEAST_FIX if "gps.fix" in table else np.zeros(n, np.bool_)
-    velocity = _velocity(table, told)
+    velocity = _velocity(table, units_given)
     why: list[tuple[NDArray[np.bool_], str]] = [(np.asarray(lost), accounts.NO_FIX)]
     if velocity is None:
         repairs.append("GPS without a velocity (gps.vn and gps.ve, or gps.speed and gps.course): not used")
@@ -61,7 +61,7 @@ def reports(
             f"gps.fix is never {LEAST_FIX:g} or more: no fix is used; of a column that is only 0 or 1 say gps.valid"
         )
     good = read & ~np.any([where for where, _ in why], axis=0)
-    position, place = _position(table, told, good, repairs)
+    position, place = _position(table, units_given, good, repairs)
     stamps = table.get("gps.time", np.full(n, np.nan))
     return Reports(np.asarray(read), why, np.column_stack((position, velocity, stamps)), np.asarray(lost), place)
 
@@ -79,10 +79,14 @@ def _read(table: Mapping[str, Array], columns: Array) -> NDArray[np.bool_]:
     return np.concatenate((there[:1].any(axis=1) & (not there.all()), changed))
 
 
-def _velocity(table: Mapping[str, Array], told: frozenset[str]) -> Array | None:
+def _velocity(table: Mapping[str, Array], units_given: frozenset[str]) -> Array | None:
     """North, east, down, speed over ground and course, shape (n, 5); without a vertical velocity it is 0."""
     speed, course = table.get("gps.speed"), table.get("gps.course")
-    if course is not None and "gps.course" not in told and np.nanmax(np.abs(course), initial=0.0) > 2.0 * np.pi + 0.01:
+    if (
+        course is not None
+        and "gps.course" not in units_given
+        and np.nanmax(np.abs(course), initial=0.0) > 2.0 * np.pi + 0.01
+    ):
         course = course / _DEGREES
     if "gps.vn" in table and "gps.ve" in table:
         n, e = table["gps.vn"], table["gps.ve"]
@@ -99,7 +103,7 @@ def _velocity(table: Mapping[str, Array], told: frozenset[str]) -> Array | None:
 
 
 def _position(
-    table: Mapping[str, Array], told: frozenset[str], good: NDArray[np.bool_], repairs: list[str]
+    table: Mapping[str, Array], units_given: frozenset[str], good: NDArray[np.bool_], repairs: list[str]
 ) -> tuple[Array, tuple[float, float] | None]:
     """Position from the first of the `good` reports on, shape (n, 3), NaN where unknown; and where that was."""
     n = len(good)
@@ -107,13 +111,13 @@ def _position(
         return np.column_stack([table.get(f"gps.{a}", np.zeros(n)) for a in "ned"]), None
     latitude, longitude = table["gps.latitude"], table["gps.longitude"]
     altitude = table.get("gps.altitude", np.zeros(n))
-    if not {"gps.latitude", "gps.longitude"} & told:
+    if not {"gps.latitude", "gps.longitude"} & units_given:
         # Degrees exceed what radians can be anywhere but next to the equator and Greenwich, and integers degrees.
         largest = max(np.nanmax(np.abs(v), initial=0.0) for v in (latitude, longitude))
         scale = 1.0 if 3.2 < largest <= 360.0 else 1e-7 if largest > 360.0 else _DEGREES
         if largest > 360.0:
             repairs.append("latitude and longitude in 1e-7 degrees: converted")
-            if "gps.altitude" not in told and np.nanmedian(np.abs(altitude)) > 1e4:
+            if "gps.altitude" not in units_given and np.nanmedian(np.abs(altitude)) > 1e4:
                 repairs.append("altitude beside them in millimetres: converted")
                 altitude = 1e-3 * altitude
     else:

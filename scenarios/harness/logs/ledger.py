@@ -9,6 +9,7 @@ separately, so that `Entry.agrees` can compare the two.
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -57,6 +58,12 @@ class Ledger(Mapping[str, Entry]):
     def use(self, stream: str, n: int) -> None:
         """`n` of those read reach the estimators."""
         self._entry(stream).used += n
+
+    def without(self, stream: str) -> "Ledger":
+        """A copy without the entry of `stream`."""
+        copy = Ledger()
+        copy._entries = {name: deepcopy(entry) for name, entry in self._entries.items() if name != stream}
+        return copy
 
     def to_json(self) -> dict[str, dict[str, Any]]:
         """As plain data: stream -> read, used, left_out."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from estimator.interface import Array
-from scenarios.harness.logs import ardupilot_matlab, dataflash, foreign, tabular
+from scenarios.harness.logs import ardupilot_matlab, column_groups, dataflash, foreign, tabular
 from scenarios.harness.logs.checks import Source
 from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
 from scenarios.harness.logs.column_names import automatic
@@ -49,12 +49,12 @@ def read(path: Path, columns: ColumnMap | None = None, imu: int | None = None) -
     return tabular.recorded(found, columns, Source(path, offered=_offered(found)), matrix_of)
 
 
-def groups(path: Path) -> tuple[list[tabular.Group], Source, tuple[str, ...]]:
+def groups(path: Path) -> tuple[list[column_groups.Group], Source, tuple[str, ...]]:
     """Columns of the file by our names, and the source; LogError as `read`."""
     content = _content(path)
     known = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), ColumnMap())
     found, meanings = _columns(path, content, known)
-    made, source = tabular.take(found, meanings, Source(path, offered=_offered(found)), matrix_of)
+    made, source = column_groups.take(found, meanings, Source(path, offered=_offered(found)), matrix_of)
     return made, source, ()
 
 
@@ -159,7 +159,7 @@ def _columns(path: Path, content: dict[str, Any], how: ColumnMap) -> tuple[dict[
         how = replace(how, columns=found, rivals=rivals)
     if not how.columns:
         raise LogError(
-            f"{path}: no column whose name is understood; it has {', '.join(_offered(columns))}: name them in a column "
+            f"{path}: no column name is recognised; it has {', '.join(_offered(columns))}: name them in a column "
             'map (--columns MAP.toml), a column of a matrix as "name[0]"'
         )
     return columns, how

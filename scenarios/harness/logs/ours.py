@@ -32,16 +32,13 @@ def read(path: Path) -> RecordedLog:
     if not len(flight.log):
         raise LogError(f"{path}: a flight without a tick")
     rows = _measured_of(flight)
-    air = (rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])
-    has = {"gps": rows["gps_new"], "magnetometer": rows["mag_new"], "airspeed": air}
-    instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
     ledger = Ledger()
     reference = Reference(_true(flight.log.truth["R_eb"], ledger), "truth", "the true attitude")
     name = path.name if path.is_dir() else path.parent.name
     known = known_of(flight) if "known" in flight.manifest else _measured(rows)  # in replay what was known in flight
     known |= calibration_of(flight)
     return RecordedLog(
-        rows, name or path.name, instruments, reference, (), place_of(flight), known, ledger,
+        rows, name or path.name, properties.sensors(rows), reference, (), place_of(flight), known, ledger,
         on_ground=on_ground_of(flight),
     )  # fmt: skip
 

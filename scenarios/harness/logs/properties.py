@@ -29,6 +29,13 @@ def measured(rows: NDArray[Any]) -> dict[str, Known]:
     return known
 
 
+def sensors(rows: NDArray[Any]) -> tuple[str, ...]:
+    """The sensors of which `rows` hold a sample."""
+    air = (rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])
+    has = {"gps": rows["gps_new"], "magnetometer": rows["mag_new"], "airspeed": air}
+    return ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
+
+
 def _rate_hz(step_s: float) -> float:
     """Of an interval, without the digits that rounding of the times makes."""
     return float(f"{1.0 / step_s:.6g}") if step_s > 0.0 else 0.0

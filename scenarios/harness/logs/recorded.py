@@ -52,7 +52,7 @@ class RecordedLog:
     """A log ready for replay.
 
     rows : shape (N,), MEASURED_DTYPE, times increasing
-    name : of the file            instruments : those that the log has
+    name : of the file            sensors : those that the log has samples of
     reference : or None           repairs : what was repaired and how often, a line each
     place : latitude and longitude of the origin of positions, degrees, where known
     known : what the log says of the instruments aboard, by the names of `estimator.instruments.PROPERTIES`, and of
@@ -64,7 +64,7 @@ class RecordedLog:
 
     rows: NDArray[Any]
     name: str
-    instruments: tuple[str, ...]
+    sensors: tuple[str, ...]
     reference: Reference | None = None
     repairs: tuple[str, ...] = ()
     place: tuple[float, float] | None = None

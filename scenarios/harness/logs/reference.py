@@ -22,8 +22,8 @@ from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs import accounts, properties
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
-from scenarios.harness.logs.text_table import LARGEST
-from scenarios.harness.logs.validity import usable
+from scenarios.harness.logs.text_table import unpacked
+from scenarios.harness.logs.validity import latest, usable
 from sim.outside import files
 
 COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
@@ -82,12 +82,8 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     rows["gps_course_rad"] = np.arctan2(velocity[:, 1], velocity[:, 0]) % (2.0 * np.pi)
     rows["mag_new"] = table["mag_new"] > 0.0
     rows["mag_b_ut"] = _held(COUNT_UT * _vector(table, "mx", "my", "mz"), rows["mag_new"] > 0)
-    flown_through_air = bool(np.any(table["airspeed"] != 0.0))
-    rows["air_new"], rows["airspeed_m_s"] = flown_through_air, table["airspeed"]
+    rows["air_new"], rows["airspeed_m_s"] = bool(np.any(table["airspeed"] != 0.0)), table["airspeed"]
     rows["baro_height_m"] = np.nan
-    instruments = ["gyro", "accelerometer"]
-    instruments += [name for name, has in (("gps", fixes), ("magnetometer", rows["mag_new"])) if np.any(has)]
-    instruments += ["airspeed"] if flown_through_air else []
     attitudes = _reference(path, reference, table["t"])
     if attitudes is not None and "_ap2013_" in attitudes.name:
         for column, step in AP2013_STEPS.items():
@@ -95,7 +91,7 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     known = {**properties.measured(rows), **_known(path, attitudes)}
     if fixes.any():
         known["gps_stamped"] = Known(False, "log", "no stamps of fixes")
-    return RecordedLog(rows, path.name, tuple(instruments), attitudes, known=known, ledger=ledger)
+    return RecordedLog(rows, path.name, properties.sensors(rows), attitudes, known=known, ledger=ledger)
 
 
 def _known(path: Path, attitudes: Reference | None) -> dict[str, Known]:
@@ -122,11 +118,7 @@ def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | No
 
 def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
     """Columns of a file of comma-separated numbers, packed or not."""
-    raw = files.unpacked(path, files.read(path, "table of reference vectors", LARGEST))
-    if len(raw) > LARGEST:
-        raise LogError(f"{path}: {files.size(len(raw))} of text, more than the {files.size(LARGEST)} that can be read")
-    text = raw.decode()
-    lines = csv.reader(text.splitlines())
+    lines = csv.reader(unpacked(path, "table of reference vectors").decode().splitlines())
     header = next(lines, [])
     missing = [name for name in wanted if name not in header]
     if missing:
@@ -156,5 +148,5 @@ def _vector(table: dict[str, Array], *names: str) -> Array:
 
 def _held(values: Array, new: NDArray[np.bool_]) -> Array:
     """`values` where `new`, held until the next, zero before the first."""
-    last = np.maximum.accumulate(np.where(new, np.arange(len(values)), -1))
+    last = latest(new)
     return np.where(last[:, None] >= 0, values[last], 0.0)

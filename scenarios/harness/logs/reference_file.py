@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.interface import Array
 from scenarios.harness.logs import accounts, attitudes, checks
+from scenarios.harness.logs.column_groups import Group
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog, Reference
-from scenarios.harness.logs.tabular import Group
 
 _UNITS = ((1.0, "seconds"), (1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 Kind = Literal["truth", "filter", "firmware"]

@@ -5,7 +5,7 @@ held from there on; of several that arrived in one tick the last one counts.  Wh
 were logged is left out: in the next row it would pass for new.  Every message is accounted for in the ledger.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -18,7 +18,7 @@ from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
-from scenarios.harness.logs import checks, gaps, tabular
+from scenarios.harness.logs import attitudes, checks, gaps, properties
 from scenarios.harness.logs.accounts import NO_FIX as NO_FIX
 from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED
 from scenarios.harness.logs.ledger import Ledger
@@ -93,6 +93,16 @@ class Messages:
     remedy: str = ""
 
 
+def first_known(logged: Iterable[tuple[Stream, Kind]]) -> tuple[Stream | None, Kind]:
+    """The first of the attitudes `logged` that has a number; if none has, the first one; if there is none, None."""
+    first: tuple[Stream | None, Kind] = None, "filter"
+    for stream, kind in logged:
+        if np.isfinite(stream.values).all(axis=1).any():
+            return stream, kind
+        first = first if first[0] else (stream, kind)
+    return first
+
+
 def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
     """The log that the messages make, put in order and judged.
 
@@ -111,10 +121,16 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
         rows["airspeed_m_s"] = np.nan_to_num(airspeed[:, 0])
     height = ticks.put("barometer", messages.height, None)
     rows["baro_height_m"] = np.nan if height is None else height[:, 0]
-    instruments = ("gyro", "accelerometer", *(name for name, new in _HAS.items() if rows[new].any()))
     reference = _reference(path, messages, rows["t_s"], after_gap, books)
     log = RecordedLog(
-        rows, path.name, instruments, reference, tuple(repairs), place, {**known, **messages.known}, books.ledger
+        rows,
+        path.name,
+        properties.sensors(rows),
+        reference,
+        tuple(repairs),
+        place,
+        {**known, **messages.known},
+        books.ledger,
     )
     log = checks.judged(log, source, books.ledger)
     for stream, new in _HAS.items():
@@ -192,18 +208,18 @@ def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[An
 
 def _intervals(t_s: Array, dt_s: Array, name: str, repairs: list[str]) -> Array:
     """Intervals as logged, NaN where the one before was not logged: then the row stands for the time since."""
-    told = (dt_s >= checks.SHORTEST_S) & (dt_s <= LONGEST_GAP_S)
-    if not told.any():
+    logged = (dt_s >= checks.SHORTEST_S) & (dt_s <= LONGEST_GAP_S)
+    if not logged.any():
         return np.full(len(t_s), np.nan)
-    usual_s, steps = float(np.median(dt_s[told])), np.diff(t_s)
+    usual_s, steps = float(np.median(dt_s[logged])), np.diff(t_s)
     if np.median(steps) > gaps.LONG * usual_s:
         repairs.append(
             f"{name}: means over {1e3 * usual_s:g} ms logged every {1e3 * np.median(steps):g} ms; "
             "each stands for the time since the one before"
         )
         return np.full(len(t_s), np.nan)
-    missing = gaps.missing(t_s, np.where(told, dt_s, usual_s))
-    return np.where(told & ~missing, dt_s, np.nan)
+    missing = gaps.missing(t_s, np.where(logged, dt_s, usual_s))
+    return np.where(logged & ~missing, dt_s, np.nan)
 
 
 class _Ticks:
@@ -300,7 +316,7 @@ def _reference(
     books.leave_out_far("reference", good, stream)
     times, first = np.unique(stream.t_s[good], return_index=True)
     books.ledger.leave_out("reference", int(good.sum()) - len(times), REPEATED)
-    R_eb = tabular.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
+    R_eb = attitudes.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
     known = np.isfinite(R_eb).all(axis=(1, 2))
     used = np.zeros(len(times), np.bool_)
     if known.any():

@@ -107,11 +107,17 @@ def read(path: Path, how: ColumnMap) -> TextTable:
     return TextTable(columns, tuple(header), [i + 1 for i in at], meanings, tuple(notes), cut, of_units)
 
 
+def unpacked(path: Path, what: str) -> bytes:
+    """The content of a file, unpacked if it is packed; LogError if it is too large.  `what` says what it should be."""
+    raw = files.unpacked(path, files.read(path, what, LARGEST))
+    if len(raw) > LARGEST:
+        raise LogError(f"{path}: {files.size(len(raw))} of text; at most {files.size(LARGEST)} can be read")
+    return raw
+
+
 def _text(path: Path) -> str:
     """The text of a file, packed or not."""
-    raw = files.unpacked(path, files.read(path, "text log", LARGEST))
-    if len(raw) > LARGEST:
-        raise LogError(f"{path}: {files.size(len(raw))} of text, more than the {files.size(LARGEST)} that can be read")
+    raw = unpacked(path, "text log")
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16")
     if found := foreign.hint(raw):

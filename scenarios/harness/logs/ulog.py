@@ -10,7 +10,7 @@ know it fill in the time of arrival.
 
 import contextlib
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import foreign, px4, streams, tabular
+from scenarios.harness.logs import attitudes, foreign, px4, streams
 from scenarios.harness.logs.ardupilot import FLYING_M_S
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Kind, Stream
@@ -58,7 +58,7 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     field, compass = _switched(log, "magnetometer", _field(log))
     airspeed, pitot = _switched(log, "airspeed", _airspeed(log))
     height = _height(log)
-    attitude = _attitude(log)
+    attitude = streams.first_known(_attitudes(log))
     notes = (f"only one of several instances is read: {'; '.join(log.others)}",) if log.others else ()
     messages = streams.Messages(
         inertial, dt_s, names, fixes, field, airspeed, height, *attitude,
@@ -306,19 +306,13 @@ def _height(log: _Log) -> Stream | None:
     return stream if stream is None or not len(first) else replace(stream, values=stream.values - first)
 
 
-def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
-    """The true attitude, else the one flown on; where neither has a number, the first one that was logged."""
-    empty: tuple[Stream | None, Kind] = None, "filter"
+def _attitudes(log: _Log) -> Iterator[tuple[Stream, Kind]]:
+    """The true attitude, then the one flown on; see `streams.first_known`."""
     for name, kind in ATTITUDES:
         found = log.first(name)
         if found is None:
             continue
         quaternion = log.columns(name, found[1], *_each("q", 4))
-        R_eb = tabular.attitude(dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)))
-        if R_eb is None:
-            continue
-        attitude = Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9))
-        if np.isfinite(R_eb).any():
-            return attitude, kind
-        empty = empty if empty[0] else (attitude, kind)
-    return empty
+        R_eb = attitudes.attitude(dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)))
+        if R_eb is not None:
+            yield Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9)), kind
