@@ -55,7 +55,7 @@ def test_output_of_the_firmware_can_be_the_reference():
     ("text", "said"),
     [
         ("t,dt\n1,2\n", "no column gx, gy, gz"),
-        (",".join(reference.INPUT) + "\n" + "1," * 20 + "x\n", "line 2, column gps_d: 'x' is no number"),
+        (",".join(reference.INPUT) + "\n" + "1," * 20 + "x\n", "line 2, column gps_d: 'x' is not a number"),
         (",".join(reference.INPUT) + "\n1,2\n", "line 2: 2 cells; the header has 21"),
         (",".join(reference.INPUT) + "\n", "no row of numbers"),
     ],

@@ -220,7 +220,7 @@ def test_object_of_matlab_is_refused_with_what_to_save(tmp_path, monkeypatch):
     opaque = MatlabOpaque(np.zeros(1, dtype=[("s0", "O"), ("arr", "O")]))
     monkeypatch.setattr(matlab.sandbox, "call", lambda *_args, **_options: {"T": opaque})
     (tmp_path / "log.mat").write_bytes(b"MATLAB 5.0")
-    with pytest.raises(LogError, match=r"T holds objects of MATLAB.*table2struct\(T, 'ToScalar', true\)"):
+    with pytest.raises(LogError, match=r"T holds MATLAB objects.*table2struct\(T, 'ToScalar', true\)"):
         logs.read(tmp_path / "log.mat")
 
 
@@ -238,5 +238,5 @@ def test_second_unit_of_the_messages_is_chosen(tmp_path, matrices, logged):
     rows = logs.read(tmp_path / "log.mat", imu=1).rows
     np.testing.assert_allclose(rows["gyro_b_rad_s"], logged.rate + 0.3, rtol=0, atol=1e-12)
     savemat(tmp_path / "plain.mat", {"t": logged.t_us / 1e6, "gyro": logged.rate, "acc": logged.force})
-    with pytest.raises(LogError, match="is chosen among the messages of an autopilot, and these are none"):
+    with pytest.raises(LogError, match="chooses an inertial unit of an autopilot"):
         logs.read(tmp_path / "plain.mat", imu=1)

@@ -33,7 +33,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -41,14 +41,13 @@ from estimator.instruments import PROPERTIES, Known
 from estimator.interface import Array, ImuSample
 from scenarios.harness.logs import column_names, units
 from scenarios.harness.logs.quantities import QUANTITIES, Meaning
-from scenarios.harness.logs.recorded import LogError
+from scenarios.harness.logs.recorded import Kind, LogError
 from scenarios.harness.logs.units import UNITS
 from scenarios.harness.plugins import near_misses
 from sim.outside import files
 from sim.outside.wording import printable
 
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
-Kind = Literal["truth", "filter", "firmware"]
 _KEYS = ("columns", "delimiter", "decimal", "skip_lines", "names", "struct", "axes", "force_reversed", "reference",
          "origin_deg", "instruments", "withheld", "on_ground")  # fmt: skip
 _ENTRIES = ("is", "unit", "factor", "offset")

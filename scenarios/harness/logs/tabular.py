@@ -20,18 +20,18 @@ from scenarios.harness.logs import accounts, attitudes, checks, fixes, propertie
 from scenarios.harness.logs.column_groups import Group, alone, take
 from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.ledger import Ledger
+from scenarios.harness.logs.properties import CLIMB_M
 from scenarios.harness.logs.quantities import FIELD, INERTIAL
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.units import COUNTS
 from scenarios.harness.logs.validity import latest, usable
 
-CLIMB_M = 5.0  # a receiver whose height changes by more than this with a vertical velocity of 0 does not report one
 FEWEST_FORCES = 5  # at most this many gyro samples for each accelerometer sample
 
 
 @dataclass(slots=True)
 class _Making:
-    """A log being made: its rows, what is known, the ledger and the repairs."""
+    """A log under construction: its rows, what is known, the ledger and the repairs."""
 
     rows: NDArray[Any]
     ledger: Ledger
@@ -43,7 +43,7 @@ class _Making:
 def recorded(
     columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source, of: Callable[[str], str] = alone
 ) -> RecordedLog:
-    """The log that the columns hold, checked.
+    """The log in the columns, checked.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def recorded(
     rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(numbers[keep], 2)
     rows["baro_height_m"] = np.nan
     for group in groups:
-        order = np.argsort(group.table["time"], kind="stable")  # what has no time comes last
+        order = np.argsort(group.table["time"], kind="stable")  # samples without a time come last
         in_order = {name: values[order] for name, values in group.table.items()}
         group = Group(in_order, group.units_given, group is not main)
         _take_fixes(made, group)
@@ -86,7 +86,7 @@ def recorded(
 
 
 def _stamps_first(meanings: ColumnMap, known: Mapping[str, Known], rows: NDArray[Any]) -> tuple[str, ...]:
-    """A line where the map names a latency of the receiver, but the fixes have stamps and these come first."""
+    """A line if the map gives a latency of the receiver but the fixes have stamps, which take precedence."""
     latency, stamped = meanings.known.get("gps_latency_s"), known.get("gps_stamped")
     if latency is None or latency.source == "withheld" or "gps_stamped" in meanings.known:
         return ()
@@ -95,13 +95,13 @@ def _stamps_first(meanings: ColumnMap, known: Mapping[str, Known], rows: NDArray
     fixes = rows[rows["gps_new"] > 0]
     late_s = float(np.nanmedian(fixes["t_s"] - fixes["gps_t_s"]))
     return (
-        f"gps_latency_s = {latency.value:g} s in the map is for fixes without a time stamp: those of gps.time are "
-        f"{late_s:.3g} s late; gps_stamped = false in the map, or --set gps_latency_s, lets it hold for all",
+        f"gps_latency_s = {latency.value:g} s in the map applies to fixes without a time stamp; by gps.time "
+        f"these are {late_s:.3g} s late. To apply it anyway: gps_stamped = false in the map, or --set gps_latency_s",
     )
 
 
 def _main(groups: list[Group], source: checks.Source) -> Group:
-    """The group with the gyro, and the accelerometer at its times; LogError where something is missing."""
+    """The group with the gyro, with the accelerometer at its times; LogError if something is missing."""
     main = next((g for g in groups if g.has(*INERTIAL[:3])), None)
     force = next((g for g in groups if g.has(*INERTIAL[3:])), None)
     if main is not None and force is not None and main is not force and main.has("time"):
@@ -120,7 +120,7 @@ def _main(groups: list[Group], source: checks.Source) -> Group:
 
 
 def _counts(offered: tuple[str, ...], missing: str) -> str:
-    """What to write for a column that counts, whose unit only its maker knows."""
+    """What to write for a column in counts, whose unit the file does not give."""
     for name in offered:
         inside = re.search(r"[(\[]\s*([^)\]]+?)\s*[)\]]", name)
         if inside and inside[1].lower() in COUNTS:
@@ -129,7 +129,7 @@ def _counts(offered: tuple[str, ...], missing: str) -> str:
 
 
 def _meet(main: Group, repairs: list[str]) -> NDArray[np.bool_]:
-    """Bring the accelerometer to the times of the gyro, where the two stand in rows of their own; which are its."""
+    """Interpolate an accelerometer in rows of its own to the times of the gyro; returns these rows."""
     gyro, force = (np.isfinite([main.table[n] for n in names]).all(axis=0) for names in (INERTIAL[:3], INERTIAL[3:]))
     if 2 * np.sum(gyro & force) >= np.sum(gyro) or np.sum(force) * FEWEST_FORCES < np.sum(gyro):
         return np.zeros(main.n, np.bool_)
@@ -142,7 +142,7 @@ def _meet(main: Group, repairs: list[str]) -> NDArray[np.bool_]:
 
 
 def _of_others(main: Group) -> NDArray[np.bool_]:
-    """Rows of other instruments: without an inertial reading, but with one that most inertial rows do not have."""
+    """Rows of other instruments: no inertial reading, but one that most inertial rows do not have."""
     none = ~np.isfinite([main.table[name] for name in INERTIAL]).any(axis=0)
     others = np.zeros(main.n, np.bool_)
     if none.any() and not none.all():
@@ -168,14 +168,14 @@ def interpolated(t_s: Array, times: Array, values: Array) -> Array:
 
 
 def _intervals(main: Group, keep: NDArray[np.intp], repairs: list[str]) -> Array:
-    """Intervals that the file holds; NaN where there are none, or where they cannot be those between its rows."""
+    """Intervals in the file; NaN if there are none, or if they do not fit the times of the rows."""
     if not main.has("interval"):
         return np.full(len(keep), np.nan)
     said = main.table["interval"][keep]
     steps = np.diff(main.table["time"][keep])
     usual, between = np.nanmedian(said) if np.isfinite(said).any() else 0.0, np.median(steps) if len(steps) else 0.0
     if not 0.8 * between <= usual <= 1.25 * between:
-        repairs.append(f"intervals of {usual:g} s are not those between the rows, {between:g} s: not used")
+        repairs.append(f"intervals of {usual:g} s do not fit the rows, which are {between:g} s apart: not used")
         return np.full(len(keep), np.nan)
     return np.where(said > 0.0, said, np.nan)
 
@@ -183,7 +183,7 @@ def _intervals(main: Group, keep: NDArray[np.intp], repairs: list[str]) -> Array
 def _put(
     made: _Making, stream: str, t_s: Array, read: NDArray[np.bool_], why: list[tuple[NDArray[np.bool_], str]]
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
-    """Rows in which a sample of the `stream` arrives, and for each row the last sample so far, -1 before the first."""
+    """Rows in which a sample of the `stream` arrives, and the last sample up to each row, -1 before the first."""
     rows_s = made.rows["t_s"]
     at = np.searchsorted(rows_s, t_s)
     why = [
@@ -193,7 +193,7 @@ def _put(
     good = accounts.samples(made.ledger, stream, read, why)
     index = np.flatnonzero(good)
     last = np.full(len(rows_s), -1)
-    last[at[index]] = index  # of several the last one stays
+    last[at[index]] = index  # the last one of several
     new = last >= 0
     made.ledger.leave_out(stream, len(index) - int(new.sum()), accounts.IN_ONE_ROW)
     made.ledger.use(stream, int(new.sum()))
@@ -218,7 +218,7 @@ def _take_fixes(made: _Making, group: Group) -> None:
     made.place = made.place or found.place
     rows["gps_new"] = new
     position = found.values[:, :3]
-    known = np.isfinite(position).all(axis=1) & ~found.lost  # a report without a position leaves that of the one before
+    known = np.isfinite(position).all(axis=1) & ~found.lost  # without a position the last one holds
     rows["gps_p_e_m"] = _held(_held(position, latest(known)), last)
     velocity = _held(found.values[:, 3:8], last)
     rows["gps_v_e_m_s"], rows["gps_speed_m_s"], rows["gps_course_rad"] = velocity[:, :3], velocity[:, 3], velocity[:, 4]
@@ -231,7 +231,7 @@ def _take_fixes(made: _Making, group: Group) -> None:
 
 
 def _reports_vertical(table: Mapping[str, Array], rows: NDArray[Any]) -> Known:
-    """Whether the receiver reports a vertical velocity: one that is 0 while the height changes is none."""
+    """Whether the receiver reports a vertical velocity: not if it is 0 while the height changes."""
     if "gps.vd" not in table:
         return Known(False, "log", "no column of it")
     fixes = rows[rows["gps_new"] > 0]
@@ -243,7 +243,7 @@ def _reports_vertical(table: Mapping[str, Array], rows: NDArray[Any]) -> Known:
 def _valid(
     table: Mapping[str, Array], t_s: Array, lost: NDArray[np.bool_], new: NDArray[np.bool_], rows_s: Array
 ) -> NDArray[np.bool_]:
-    """Rows in which the last fix is usable: as the file says, else see `usable`."""
+    """Rows in which the last fix is usable: as the file says, otherwise see `usable`."""
     if "gps.valid" in table:
         said = np.flatnonzero(np.isfinite(table["gps.valid"]) & np.isfinite(t_s))
         before = np.searchsorted(t_s[said], rows_s, side="right") - 1
@@ -255,7 +255,7 @@ def _valid(
 
 
 def _take_field(made: _Making, group: Group) -> None:
-    """Fill the magnetometer's columns; without ``mag.new`` a sample arrives where its values change."""
+    """Fill the magnetometer's columns; without ``mag.new`` a change of its values is a sample."""
     if not group.has(*FIELD):
         return
     field_ut = np.column_stack([group.table[name] for name in FIELD])
@@ -284,7 +284,7 @@ def _take_air(made: _Making, group: Group) -> None:
         flag = next((name for name in flags if name in table), None)
         there = np.isfinite(table[quantity])
         read = there if flag is None else table[flag] > 0.0
-        if flag == "air.new":  # of the other of the two where this one has no number
+        if flag == "air.new":  # for the other one, if this one has no number
             other = table.get("height" if quantity == "airspeed" else "airspeed", np.full(group.n, np.nan))
             read = read & (there | ~np.isfinite(other))
         new, last = _put(made, stream, table["time"], np.asarray(read), [(~there, accounts.NO_NUMBER)])
@@ -299,7 +299,7 @@ def _take_air(made: _Making, group: Group) -> None:
 def _take_attitude(
     made: _Making, groups: list[Group], main: Group, keep: NDArray[np.intp], source: checks.Source, meanings: ColumnMap
 ) -> Reference | None:
-    """The attitude in the file, at the times of the rows; interpolated where it stands between them."""
+    """The attitude in the file at the times of the rows, interpolated between its samples."""
     group = next((g for g in groups if attitudes.form_of(g.table)), None)
     if group is None:
         return None

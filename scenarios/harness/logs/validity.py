@@ -1,11 +1,11 @@
-"""For how long the last fix of a receiver is of use."""
+"""How long the last fix of a receiver can be used."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.interface import Array
 
-LONGEST_S, INTERVALS = 2.0, 3.0  # without a fix: the longer of these, in seconds and in usual intervals
+LONGEST_S, INTERVALS = 2.0, 3.0  # the longer of these: seconds, and usual intervals between fixes
 
 
 def latest(where: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -16,14 +16,14 @@ def latest(where: NDArray[np.bool_]) -> NDArray[np.intp]:
 def usable(new: NDArray[np.bool_], t_s: Array, lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Rows in which the last fix is usable, shape (N,).
 
-    A fix is usable from its arrival until the receiver says that it has lost it, and until no other has come for 2 s
-    and three of its usual (median) intervals.
+    A fix is usable from its arrival until the receiver reports that it is lost, or until no other has arrived for 2 s
+    or three median intervals, whichever is longer.
 
     Parameters
     ----------
     new : shape (N,)      rows in which a fix arrived
     t_s : shape (N,)      times of the rows, increasing
-    lost : shape (N,)     rows in which the receiver said that it has no fix; one that arrived in the same row counts
+    lost : shape (N,)     rows in which the receiver reported no fix; a fix in the same row takes precedence
     """
     arrived = np.flatnonzero(new)
     if not len(arrived):
