@@ -17,10 +17,10 @@ from autopilot.interface import NEUTRAL
 from estimator.interface import Array, ImuSample
 from estimator.premerlani import PremerlaniParams
 from estimator.rotation import inclination_error_rad, rotation_error_rad
-from scenarios.harness.fitted import suite_params
 from sim.clock import Rates
 from sim.log import Log
 from sim.motion.prescribed_plant import Motion, PrescribedPlant
+from sim.sensors.fitting import suite_params
 from sim.sensors.suite import Suite
 
 IMU_HZ = 50

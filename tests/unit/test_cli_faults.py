@@ -115,7 +115,7 @@ def test_check_flies_every_seed_with_the_faults(here, monkeypatch):
     hand_launch = find("hand_launch")
     short = replace(hand_launch, config=hand_launch.config.model_copy(update={"duration_s": 4.0}))
     monkeypatch.setattr(gate, "find", lambda _: short)
-    monkeypatch.setattr("scenarios.harness.preflight.find", lambda _: short)
+    monkeypatch.setattr("scenarios.harness.flight.find", lambda _: short)
     arguments = ["check", "hand_launch", "--seeds", "0", "--workers", "1", "--json", "verdict.json"]
     assert run([*arguments, "--fault", "gyro:saturated@0.5"]) == 1
     assert not json.loads((here / "verdict.json").read_text())["passed"]

@@ -9,10 +9,8 @@ import numpy as np
 
 from autopilot.interface import NEUTRAL
 from estimator.blocks.magnetometer import Calibration
-from estimator.blocks.screening import G_M_S2
-from estimator.interface import Array, ImuSample
+from estimator.interface import G_M_S2, Array, ImuSample
 from estimator.rotation import inclination_error_rad
-from scenarios.harness.fitted import suite_params
 from sim import place
 from sim.clock import Rates
 from sim.log import Log
@@ -20,6 +18,7 @@ from sim.magnetic_field import field_e_ut
 from sim.motion.prescribed_plant import Motion, PrescribedPlant
 from sim.motion.turn_table import TurnTable
 from sim.power_up import sample_at_rest
+from sim.sensors.fitting import suite_params
 from sim.sensors.suite import Suite
 
 RATES = Rates(gps_hz=5.0)

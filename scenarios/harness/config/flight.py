@@ -17,19 +17,19 @@ from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios fin
 from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
 from scenarios.harness.config.validation import validated
-from scenarios.harness.fitted import suite_params
+from scenarios.harness.seeds import LARGEST_SEED
 from sim.clock import Rates
 from sim.log import FLOWN_DTYPE, TRUTH_DTYPE
 from sim.outside.numbers import RIGHT, is_odd, number
 from sim.outside.wording import brief, printable
+from sim.params import changed as change_params
 from sim.params import dotted_fields, near_misses, require_fitted, shown, unit_of
 from sim.rng import stream
-from sim.sensors.fitting import own_files
+from sim.sensors.fitting import SuiteParams, own_files, suite_params
 
 MOST_BYTES = 2_000_000_000  # of a flight's log, which is held in memory
 ROW_BYTES = sum(dtype.itemsize for dtype in (TRUTH_DTYPE, MEASURED_DTYPE, FLOWN_DTYPE))
 SMALLEST, LARGEST = 1e-12, 1e9  # of a number that is no zero, in whatever unit
-LARGEST_SEED = 2**32 - 1
 
 Chance = Literal["random"]
 Triple = tuple[float, float, float]
@@ -240,33 +240,42 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
     ------
     ValueError      one line with the field, the value, its unit and what would be right
     """
+    return overridden(config, overrides)[0]
+
+
+def overridden(config: FlightConfig, overrides: Mapping[str, Any]) -> tuple[FlightConfig, SuiteParams]:
+    """What `override` gives, and the figures of the suite that is then carried."""
     data = config.model_dump()
     if "suite" in overrides:  # first, for its fields are named by other overrides; its files are read anew
         data |= {"suite": str(overrides["suite"]), "files": {}}
         config = config.model_copy(update={"suite": data["suite"], "files": {}})
+    unchanged = suite_params(config.suite, {}, config.files)
     for name, value in overrides.items():
         if name == "wind":
             wind = parse_wind(str(value))
             data["air"] |= {"wind_m_s": wind.m_s, "wind_from_deg": wind.from_deg}
         else:
-            full_name = _full_name(name, config)
+            full_name = _full_name(name, config, unchanged)
             _refuse_odd(full_name, value)
             _put(data, full_name, value)
     changed = validated(FlightConfig, data)
-    # Refuses a suite, a value or a fault that cannot be.
-    fitted = suite_params(changed.suite, changed.sensors, changed.files)
+    fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
     require_faults_possible(changed.faults, fitted)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
-    return changed
+    return changed, fitted
+
+
+def fitted_suite(config: FlightConfig) -> SuiteParams:
+    """The figures of the suite that is carried under `config`; ValueError if there is no such suite or figure."""
+    return suite_params(config.suite, config.sensors, config.files)
 
 
 _TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts")
 
 
-def _full_name(name: str, config: FlightConfig) -> str:
-    """Dotted name of a field that exists, or a ValueError with those that come near."""
-    fitted = suite_params(config.suite, {}, config.files)
+def _full_name(name: str, config: FlightConfig, fitted: SuiteParams) -> str:
+    """Dotted name of a field that exists, or a ValueError with those that come near; `fitted` is its suite."""
     fields = dotted_fields(fitted)
     if name in fields:
         return f"sensors.{name}"
@@ -333,22 +342,26 @@ def _is_sane(value: Any) -> bool:
     return not isinstance(value, int | float) or value == 0 or SMALLEST <= abs(value) <= LARGEST
 
 
-def resolve(config: FlightConfig) -> FlightConfig:
+def resolve(config: FlightConfig, suite: SuiteParams | None = None) -> FlightConfig:
     """`config` with all that was left open in numbers: chance drawn, each from its named stream; idempotent.
 
-    The rate of the GPS becomes the receiver's own, and the files of one's own sensors are kept.
+    The rate of the GPS becomes the receiver's own, and the text of the user's own sensor files is kept.
+
+    suite : what is carried, as `fitted_suite` gives it; None looks it up
     """
     start = _resolve_start(config)
     air = resolve_air(config.air, start.heading_deg, config.seed, config.flight)
     files = config.files or own_files(config.suite)
-    return config.model_copy(update={"start": start, "air": air, "files": files, "rates": _resolve_rates(config)})
+    return config.model_copy(
+        update={"start": start, "air": air, "files": files, "rates": _resolve_rates(config, suite)}
+    )
 
 
-def _resolve_rates(config: FlightConfig) -> RatesConfig:
+def _resolve_rates(config: FlightConfig, suite: SuiteParams | None) -> RatesConfig:
     if config.rates.gps_hz is not None:
         return config.rates
-    receiver = suite_params(config.suite, config.sensors, config.files).gps
-    rates = config.rates.model_copy(update={"gps_hz": receiver.rate_hz})
+    receiver_hz = (suite or fitted_suite(config)).gps.rate_hz
+    rates = config.rates.model_copy(update={"gps_hz": receiver_hz})
     rates.build()  # refuses a receiver whose rate the physics cannot keep
     return rates
 

@@ -80,7 +80,7 @@ def _written(v: FlightVerdict) -> dict[str, Any]:
     rows = [asdict(row) | {"measured": _number(row.measured)} for row in v.rows]
     return {
         "scenario": v.scenario, "estimator": v.estimator, "seed": v.seed, "flight": v.flight,
-        "outcome": str(v.outcome), "message": v.message, "rows": rows, "metrics": v.metrics,
+        "outcome": str(v.outcome), "message": v.message, "rows": rows, "metrics": dict(v.metrics),
         "known": to_json(v.known), "wall_s": v.wall_s,
     }  # fmt: skip
 
