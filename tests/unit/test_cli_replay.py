@@ -149,7 +149,7 @@ def test_replay_tells_what_it_repaired(here: Path, capsys) -> None:
         (["bad.csv"], "bad.csv: line 3, column gx: 'x' is not a number"),
         (["bad.csv", "--columns", "nothing"], "no column map 'nothing'"),
         (["bad.csv", "--estimator", "premerlany"], "unknown estimator 'premerlany': did you mean premerlani"),
-        (["bad.csv", "--estimator", "gyro_only,gyro_only"], "name each one once"),
+        (["bad.csv", "--estimator", "gyro_only,gyro_only"], "each only once"),
         (["bad.csv", "--set", "gain=2"], "unknown parameter 'gain' of estimator premerlani"),
         (["bad.csv", "--settle", "-1"], "settle_s = -1 s: must be zero or more"),
     ],

@@ -12,7 +12,7 @@ import numpy as np
 
 from scenarios.harness.logs import checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
-from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog
+from scenarios.harness.logs.recorded import Kind, LogError, NothingToScore, RecordedLog
 from sim.outside import files
 from sim.outside.wording import printable
 
@@ -78,7 +78,7 @@ def _against(log: RecordedLog, path: Path) -> RecordedLog:
 
     rows_s, ledger, repairs = log.rows["t_s"], log.ledger.without("reference"), list(log.repairs)
     reader = _module(path.name.lower(), _BY_MAP)
-    kind: reference_file.Kind = "filter"
+    kind: Kind = "filter"
     try:
         if reader and not vectors.is_reference(path):
             groups, source, notes = import_module(f"{__name__}.{reader}").groups(path)

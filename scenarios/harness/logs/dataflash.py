@@ -18,8 +18,8 @@ from scenarios.harness.logs import attitudes, streams
 from scenarios.harness.logs.ardupilot import FIX_3D, Parameters, year_of
 from scenarios.harness.logs.ardupilot_matlab import MatlabMessages
 from scenarios.harness.logs.dataflash_records import Clock, DataFlash, Records, own_time_s
-from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import IN_GAP, NO_FIX, UNHEALTHY, Kind, Stream
+from scenarios.harness.logs.recorded import Kind, LogError, RecordedLog
+from scenarios.harness.logs.streams import IN_GAP, NO_FIX, UNHEALTHY, Stream
 
 GYRO, FORCE, FIELD = (tuple(f"{name}{axis}" for axis in "XYZ") for name in ("Gyr", "Acc", "Mag"))
 FIX = ("Lat", "Lng", "Alt", "Spd", "GCrs")

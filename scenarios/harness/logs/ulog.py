@@ -23,8 +23,8 @@ from estimator.instruments import Known
 from estimator.interface import Array
 from scenarios.harness.logs import attitudes, foreign, px4, streams
 from scenarios.harness.logs.ardupilot import FLYING_M_S
-from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Kind, Stream
+from scenarios.harness.logs.recorded import Kind, LogError, RecordedLog
+from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Stream
 from scenarios.harness.logs.ulog_bytes import whole
 from sim.outside import files
 
