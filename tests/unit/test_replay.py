@@ -180,7 +180,7 @@ def test_judged_are_airborne_rows_after_settling():
     assert "fastest fix: 12.0 m/s" in why_none(log, Window(airborne_m_s=13.0))
     assert not judged_rows(replace(log, reference=None), Window()).any()
     assert "no attitude" in why_none(replace(log, reference=None), Window())
-    assert "within the 100 s to settle" in why_none(log, Window(settle_s=100.0))
+    assert "after 100 s to settle" in why_none(log, Window(settle_s=100.0))
     elsewhere = replace(log, reference=replace(log.reference, R_eb=np.full((1000, 3, 3), np.nan)))
     assert "do both use one clock?" in why_none(elsewhere, Window())
 
