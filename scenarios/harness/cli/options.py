@@ -19,7 +19,7 @@ MOST_WORKERS = max(64, 4 * (os.cpu_count() or 1))
 
 ScenarioArgument = Annotated[
     str,
-    typer.Argument(help="Name of a scenario, or file.py with one's own.", autocompletion=complete.scenarios),
+    typer.Argument(help="Name of a scenario, or file.py of your own.", autocompletion=complete.scenarios),
 ]
 KindArgument = Annotated[
     str | None,
@@ -36,7 +36,11 @@ EstimatorOption = Annotated[
 ]  # fmt: skip
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter: gps.latency_s=0.5, or my_filter.k_p=1 of an estimator."),
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Any other parameter: gps.latency_s=0.5, or my_filter.k_p=1.",
+    ),
 ]
 WindOption = Annotated[
     str | None,
@@ -84,7 +88,7 @@ ImuRateOption = Annotated[
 SensorsOption = Annotated[
     str | None,
     typer.Option(
-        "--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.", autocompletion=complete.suites
+        "--sensors", metavar="NAME", help="Sensor suite, or suite.toml of your own.", autocompletion=complete.suites
     ),
 ]
 FaultOption = Annotated[
@@ -152,7 +156,8 @@ SeveralOption = Annotated[
     ),
 ]  # fmt: skip
 ParameterOption = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators, k_p=1, or of one, my_filter.k_p=1.")
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter: k_p=1, or my_filter.k_p=1."),
 ]
 LogEstimatorsOption = Annotated[
     str,
