@@ -163,8 +163,9 @@ def print_parameters(found: Mapping[str, Sequence[Parameter]]) -> None:
     """A table for each estimator: name, default and unit, then what it is and what a change does."""
     for spec, params in found.items():
         rows = [[p.name, f"{default_text(p.default)} {_unit(p.unit)}".strip(), _text(p)] for p in params]
-        table = console.table(f"{spec}: --set {names_of(spec)[0]}.NAME=VALUE", ("", "", ""), rows or [["no parameters", "", ""]],
-                              text=(0, 1, 2), wrapping=(1, 2))  # fmt: skip
+        title = f"{spec}: --set {names_of(spec)[0]}.NAME=VALUE"
+        rows = rows or [["no parameters", "", ""]]
+        table = console.table(title, ("", "", ""), rows, text=(0, 1, 2), wrapping=(1, 2))
         console.out().print(table)
 
 
