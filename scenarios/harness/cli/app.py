@@ -330,36 +330,36 @@ def compare(
 def claims(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Claims, or patterns as offset*; all by default.", autocompletion=complete.claims),
+        typer.Argument(help="Claims, or patterns such as offset*. [default: all]", autocompletion=complete.claims),
     ] = None,
     seeds: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7. [default: of each claim]")
+        str | None, typer.Option(metavar="LIST", help="Seeds: 0-9 or 0,2,5-7. [default: as many as each claim needs]")
     ] = None,
     workers: WorkersOption = None,
     flight_timeout: FlightTimeoutOption = None,
-    list_only: Annotated[bool, typer.Option("--list", help="Say what claims there are, and measure none.")] = False,
+    list_only: Annotated[bool, typer.Option("--list", help="List the claims without testing them.")] = False,
     pictures: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw them. [default: images beside the Markdown]")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for the pictures. [default: images/ beside the Markdown]"),
     ] = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
-    """What the papers claim, put to the test: each with its numbers, its verdict and its picture."""
-    from scenarios.harness.claims import report as claim_report
+    """Test the claims of the papers: numbers, verdicts and pictures."""
+    from scenarios.harness.claims import page as claim_page
     from scenarios.harness.claims import run as claim_run
-    from scenarios.harness.claims.registry import matching
     from scenarios.harness.commands import check as gate
     from scenarios.harness.gate import workers as crew
 
     with reporting(json_) as report:
         with usage():
-            wanted = matching(names or [])
+            wanted = claim_run.matching(names or [])
             if list_only:
-                report(claim_report.listed(wanted))
-                claim_report.tell_list(wanted)
+                report(claim_page.titles(wanted))
+                claim_page.print_titles(wanted)
                 return 0
             check_file(markdown)
-            folder = claim_report.folder_of_pictures(markdown, pictures)
+            folder = claim_page.picture_folder(markdown, pictures)
             numbers = None if seeds is None else gate.parse_seeds(seeds)
             with console.progress("measuring", "claims") as advance:
                 findings = claim_run.measure(
@@ -370,10 +370,10 @@ def claims(
                     drawn=folder is not None,
                     limit_s=time_limit(flight_timeout),
                 )
-        claim_report.write_all(findings, markdown, folder)
+        claim_page.write_files(findings, markdown, folder)
         report(findings.to_json())
         # Last: a reader who closes the pipe loses no file.
-        claim_report.tell(findings, detailed=bool(names) and len(wanted) == 1)
+        claim_page.print_report(findings, detailed=bool(names) and len(wanted) == 1)
     return findings.exit_code
 
 

@@ -16,7 +16,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from estimator.interface import Array
 from scenarios.harness.cli.reports import write_figure
-from scenarios.harness.commands.aircraft_picture import (
+from scenarios.harness.commands.compare import LETTERS, Comparison, Entrant, checks_text
+from scenarios.harness.metrics import Series, p95, rms
+from scenarios.harness.picture_style import (
     BLUE,
     DPI,
     FAINT,
@@ -29,8 +31,6 @@ from scenarios.harness.commands.aircraft_picture import (
     TEAL,
     VIOLET,
 )
-from scenarios.harness.commands.compare import LETTERS, Comparison, Entrant, checks_text
-from scenarios.harness.metrics import Series, p95, rms
 from sim.outside.wording import plotted
 
 COLOURS = (
