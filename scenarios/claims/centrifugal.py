@@ -59,10 +59,8 @@ def centrifugal_compensation(seeds: Sequence[int]) -> Finding:
     swayed = np.concatenate([bank_size_deg(f).within(10.0, math.inf).value for f in uncompensated])
     ended_s = float(np.median([time_s(flight)[-1] for flight in uncompensated]))
 
-    error = Panel(
-        "Inclination error in a turn of two minutes", "time, s", "deg", legend="upper right", ylim=(0.0, 42.0)
-    )
-    true_bank = Panel("True bank; setpoint 30 deg", "time, s", "deg", ylim=(0.0, 60.0))
+    error = Panel("Inclination error in a turn of two minutes", "deg", ylim=(0.0, 42.0))
+    true_bank = Panel("True bank; setpoint 30 deg", "deg", ylim=(0.0, 60.0))
     for flown, colour, name in ((uncompensated, RED, "not compensated"), (compensated, BLUE, "Eqns 25 and 26")):
         error.flights(flown, inclination_error_deg, colour, name)
         true_bank.flights(flown, bank_size_deg, colour)
@@ -73,7 +71,7 @@ def centrifugal_compensation(seeds: Sequence[int]) -> Finding:
             line("uncompensated: flights that hit the ground", "%", percentage(uncompensated, hit_ground), ">=", 90.0),
         ],
         summary=f"At {bank:.0f} degrees of bank in calm air, the inclination error is {good:.1f} degrees RMS. Without "
-        f"the centrifugal term the accelerometer levels the matrix in the turn: {bad:.0f} degrees. The bank then varies "
+        f"the centrifugal term the accelerometer levels the matrix in the turn: {bad:.0f} degrees. The bank varies "
         f"between {swayed.min():.0f} and {swayed.max():.0f} degrees, and after {ended_s:.0f} s the aeroplane, which "
         "started at 200 m, hits the ground.",
         panels=[error, true_bank],
@@ -100,10 +98,7 @@ def ground_speed(seeds: Sequence[int]) -> Finding:
     ground, turns, less_wind = errors.values()
     light = WINDS_M_S.index(LIGHT_M_S)
 
-    panel = Panel(
-        "Inclination error in a steady turn, by the speed used in Eqn 25", "wind, m/s (the airspeed is 12.6 m/s)",
-        "deg RMS", legend="upper left", ylim=(0.0, 12.0),
-    )  # fmt: skip
+    panel = Panel("Inclination error in a steady turn, by the speed used", "deg RMS", "wind, m/s", ylim=(0.0, 12.0))
     for way, (_, colour) in ways.items():
         panel.curve(WINDS_M_S, errors[way], colour, way, "o-")
     panel.level(TURNS_DEG, text="acceptable in turns", side="left")

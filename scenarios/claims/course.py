@@ -55,10 +55,7 @@ def along_the_course(seeds: Sequence[int]) -> Finding:
     crab = pooled_rms(flown, _crab_series, SETTLED_S)
     course, nose = (pooled_rms(flown, series, SETTLED_S) for series in (COURSE, NOSE))
 
-    panel = Panel(
-        "Straight flight in 5 m/s of crosswind: heading minus true course", "time, s", "deg, positive into the wind",
-        legend="upper right", xlim=(0.0, 60.0), ylim=(-20.0, 50.0),
-    )  # fmt: skip
+    panel = Panel("Heading minus true course in a crosswind", "deg into the wind", xlim=(0.0, 60.0), ylim=(-20.0, 50.0))
     sides = [np.sign(np.median(crab_deg(flight))) for flight in flown]
     for angle_deg, colour, name in ((crab_deg, ORANGE, "true nose"), (course_error_deg, BLUE, "matrix")):
         curves = [(time_s(flight), side * angle_deg(flight)) for side, flight in zip(sides, flown, strict=True)]
@@ -128,10 +125,7 @@ def crosswind_reversal(seeds: Sequence[int]) -> Finding:
         else "most flights end before the heading stays within 10 degrees of the course"
     )
 
-    panel = Panel(
-        "Reversal in a crosswind of 5 m/s: heading minus true course", "s after the turn begins", "crab angles",
-        legend="lower right", xlim=(-20.0, 58.0), ylim=(-1.2, 2.6),
-    )  # fmt: skip
+    panel = Panel("Reversal: heading minus course", "crab angles", "s after the turn begins", xlim=(-20.0, 58.0))
     for flown, colour, w_y in ((small, RED, SMALL), (large, BLUE, LARGE)):
         curves = []
         for flight in flown:
@@ -155,7 +149,7 @@ def crosswind_reversal(seeds: Sequence[int]) -> Finding:
     )
 
 
-WEIGHTS = (0.1, 0.3, 0.6, 1.2, 2.4)
+WEIGHTS, BY_WEIGHT = (0.1, 0.3, 0.6, 1.2, 2.4), "weight of the yaw correction"
 
 
 @claim(Paper.THEORY, "GPS, reasons for a large weight", expected=Verdict.WITH_CONDITION, seeds=3)
@@ -175,12 +169,9 @@ def large_yaw_weight(seeds: Sequence[int]) -> Finding:
     )
     gained = {m: errors[-1] / errors[WEIGHTS.index(0.3)] for m, errors in heading.items()}
 
-    x, of_ratio = "weight of the yaw correction", "heading error with a weight of 2.4, over that with 0.3"
-    head = Panel(
-        "Heading error, turning in wind", x, "deg RMS, against the course", legend="lower left", xscale="log",
-        xticks=WEIGHTS, ylim=(0.0, 25.0),
-    )  # fmt: skip
-    down = Panel("Inclination error", x, "deg RMS", xscale="log", xticks=WEIGHTS, ylim=(0.0, 5.0))
+    of_ratio = "heading error with a weight of 2.4, over that with 0.3"
+    head = Panel("Heading error, turning in wind", "deg RMS", BY_WEIGHT, log="x", xticks=WEIGHTS, ylim=(0.0, 25.0))
+    down = Panel("Inclination error", "deg RMS", BY_WEIGHT, log="x", xticks=WEIGHTS, ylim=(0.0, 5.0))
     for matched, colour, name in ((False, RED, "GPS lag ignored"), (True, BLUE, "GPS lag matched")):
         head.curve(WEIGHTS, heading[matched], colour, name, "o-")
         down.curve(WEIGHTS, inclination[matched], colour, style="o-")
@@ -188,11 +179,11 @@ def large_yaw_weight(seeds: Sequence[int]) -> Finding:
         lines=[line(of_ratio, "", gained[False], "<=", 0.8)],
         condition="if the estimator models the lag of the receiver",
         conditional_lines=[line(of_ratio, "", gained[True], "<=", 0.8)],
-        summary="In reversals in wind, with the GPS lag ignored, a weight above 0.3 gains nothing: the heading error is "
+        summary="In reversals in wind with the GPS lag ignored, a weight above 0.3 gains nothing: the heading error is "
         f"{heading[False][1]:.0f} degrees RMS at 0.3 and {heading[False][-1]:.0f} at 2.4, and the inclination error "
-        f"goes from {inclination[False][0]:.1f} to {inclination[False][-1]:.1f}. With the lag matched the heading error "
-        f"falls from {heading[True][0]:.0f} degrees at 0.1 to {heading[True][-1]:.0f} at 2.4, and the inclination error "
-        "does not change.",
+        f"goes from {inclination[False][0]:.1f} to {inclination[False][-1]:.1f}. With the lag matched, the heading "
+        f"error falls from {heading[True][0]:.0f} degrees at 0.1 to {heading[True][-1]:.0f} at 2.4, and the "
+        "inclination error does not change.",
         panels=[head, down],
     )
 
@@ -215,14 +206,11 @@ def yaw_recovery(seeds: Sequence[int]) -> Finding:
     turned = {w: flights("turns_180", seeds, tuned(w_y=w, w_y_until_lock=LARGE)) for w in (0.3, LARGE)}
     after = {w: slowest(_recovery_s(flight, SETTLED_S) for flight in turned[w]) for w in turned}
 
-    error = Panel("Recovery from a heading error of 60 degrees", "time, s", "deg, against the course")
+    error = Panel("Recovery from a heading error of 60 degrees", "deg, against the course")
     for w, colour in zip((0.1, 0.3, LARGE), (RED, ORANGE, BLUE), strict=True):
         error.flights(begun[w], COURSE, colour, f"W_Y = {w:g}", 0.0, 40.0)
     error.level(RECOVERED_DEG)
-    by_weight = Panel(
-        "Time to recover to 10 degrees", "weight of the yaw correction", "s", xscale="log", xticks=WEIGHTS,
-        ylim=(0.0, None),
-    )  # fmt: skip
+    by_weight = Panel("Time to recover to 10 degrees", "s", BY_WEIGHT, log="x", xticks=WEIGHTS, ylim=(0.0, None))
     for w in WEIGHTS:
         by_weight.cloud(w, lock[w], BLUE)
     by_weight.level(RECOVERY_S, text="10 s")
@@ -253,13 +241,10 @@ def wind_vector(seeds: Sequence[int]) -> Finding:
     of_nose, of_course = pooled_rms(knowing, NOSE, first_s), pooled_rms(adapting, COURSE, first_s)
     worst = max(mean_size(wind_error_m_s(flight).within(100.0, math.inf).judged_values) for flight in knowing)
 
-    learnt = Panel("Error of the learnt wind (5 m/s)", "s (turns at 25, 70 and 115 s)", "m/s", ylim=(0.0, 2.5))
+    learnt = Panel("Error of the learnt wind (5 m/s)", "m/s", "s (turns at 25, 70 and 115 s)", ylim=(0.0, 2.5))
     learnt.flights(knowing, wind_error_m_s, GREEN)
     learnt.level(1.0, FAINT)
-    heading = Panel(
-        "Heading error against its own reference", "time, s", "deg, RMS of the flights", legend="upper right",
-        ylim=(0.0, 45.0),
-    )  # fmt: skip
+    heading = Panel("Heading error against its own reference", "deg, RMS of the flights", ylim=(0.0, 45.0))
     for flown, series_of, colour, name in (
         (adapting, COURSE, ORANGE, "adapts: against the course"),
         (knowing, NOSE, GREEN, "knows the wind: against the nose"),

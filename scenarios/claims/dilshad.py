@@ -77,11 +77,11 @@ def dilshad_ground(seeds: Sequence[int]) -> Finding:
     On the ground with proper calibration, roll and pitch stay at zero and yaw is constant with a very small value for
     ten minutes: gyro drift is handled.
     """
-    variances, off, leaning, raw, gyros = [], [], [], [], []
+    spreads, off, leaning, raw, gyros = [], [], [], [], []
     for seed in seeds:
         log = seen(Rest(), TEN_MINUTES_S, BOARD, seed=seed)
         R, R_raw = estimated(log, seed), uncalibrated(log)
-        variances.append(np.var(angles_off_deg(R, log), axis=1))
+        spreads.append(np.std(angles_off_deg(R, log), axis=1))
         off.append(rms(heading_off_deg(R, log)))
         leaning.append(tilt_deg(R, log)[SETTLED:])
         raw.append(rms(_wrapped_deg(heading_off_deg(R_raw, log))))
@@ -90,13 +90,13 @@ def dilshad_ground(seeds: Sequence[int]) -> Finding:
         gyros.append(abs(heading_off_deg(np.asarray(alone.replay(log.measured)["R_eb"]), log)[-1]))
         if seed == seeds[0]:
             minutes, R_first, R_raw_first = log.truth["t_s"][::25] / 60.0, R, R_raw
-    roll, pitch, yaw = np.sqrt(np.mean(variances, axis=0))
+    roll, pitch, yaw = np.sqrt(np.mean(np.square(spreads), axis=0))
     pooled, pooled_raw, pooled_gyros = (rms(np.array(values)) for values in (off, raw, gyros))
     tilt = rms(np.concatenate(leaning))
 
     panels = [
-        Panel("Not calibrated", "time, minutes", "angle, deg", columns=3),
-        Panel("Calibrated", "time, minutes", "angle, deg", columns=3, ylim=(-10.0, 10.0)),
+        Panel("Not calibrated", "angle, deg", "time, minutes", columns=3),
+        Panel("Calibrated", "angle, deg", "time, minutes", columns=3, ylim=(-10.0, 10.0)),
     ]
     for panel, of in zip(panels, (R_raw_first, R_first), strict=True):
         shown = {name: np.degrees(angle)[::25] for name, angle in zip(ANGLES, paper_angles(of), strict=True)}
@@ -129,7 +129,7 @@ def dilshad_hover(seeds: Sequence[int]) -> Finding:
     errors = [angles_off_deg(estimated(log, seed), log) for log, seed in zip(logs, seeds, strict=True)]
     roll, pitch, yaw = np.sqrt(np.mean([np.var(error, axis=1) for error in errors], axis=0))
 
-    panel = Panel("Errors of the three angles in hover", "time, s", "error, deg", columns=3)
+    panel = Panel("Errors of the three angles in hover", "error, deg", columns=3)
     t_s = logs[0].truth["t_s"][SETTLED:]
     shown = {name: error[t_s < 180.0] for name, error in zip(ANGLES, errors[0], strict=True)}
     panel.curves(t_s[t_s < 180.0], shown, (GREEN, ORANGE, BLUE), lw=1.5)
@@ -139,8 +139,8 @@ def dilshad_hover(seeds: Sequence[int]) -> Finding:
             line("pitch, standard deviation", "deg", pitch, "<=", 1.0),
             line("yaw, standard deviation over the larger of these", "", yaw / max(roll, pitch), ">=", 1.5),
         ],
-        summary=f"In hover the standard deviations of roll and pitch are {roll:.2f} and {pitch:.2f} degrees; yaw varies "
-        f"in waves with {yaw:.1f}, {yaw / max(roll, pitch):.1f} times as much.",
+        summary=f"In hover the standard deviations of roll and pitch are {roll:.2f} and {pitch:.2f} degrees; yaw "
+        f"varies in waves with {yaw:.1f}, {yaw / max(roll, pitch):.1f} times as much.",
         panels=[panel],
     )
 
@@ -177,16 +177,16 @@ def dilshad_yaw_wave(seeds: Sequence[int]) -> Finding:
     dipping, level = _perfect_sd_deg(perfect), _perfect_sd_deg(without_dip(perfect))
 
     minutes = hovering(seeds[0]).truth["t_s"][SETTLED:] / 60.0
-    used = Panel("Hover, GPS course used", "time, minutes", "yaw error, deg")
+    used = Panel("Hover, GPS course used", "yaw error, deg", "time, minutes")
     shown = {"filtered, 0.2 s late": waves["delayed"][0], "without any delay": waves["undelayed"][0]}
     used.curves(minutes, shown, (ORANGE, BLUE), lw=1.5)
-    unused = Panel("Two minutes without GPS", "time, minutes", "yaw error, deg")
+    unused = Panel("Two minutes without GPS", "yaw error, deg", "time, minutes")
     unused.curve(minutes[:6000], waves["no GPS"][0][:6000], FAINT, lw=1.5)
     return Finding(
         lines=[line("waves without the delay, over those with it", "", undelayed / delayed, "<=", 0.8)],
         summary=f"If a hovering craft uses its GPS course, the standard deviation of yaw is {delayed:.0f} degrees with "
         f"the delay of the receiver and {undelayed:.0f} without: at rest there is no course. Without GPS it is "
-        f"{none:.1f}: in hover the accelerometer does not show the tilt, which the dip of the magnetic field turns into "
+        f"{none:.1f}: in hover the accelerometer does not show the tilt, which the magnetic dip turns into "
         f"a heading error (perfect sensors: {dipping:.1f}, in a horizontal field {level:.2f}).",
         panels=[used, unused],
     )
@@ -210,14 +210,14 @@ def dilshad_gps_lost(seeds: Sequence[int]) -> Finding:
     (used, used_first), (gated, gated_first), (lost, _) = off(ALWAYS_M_S), off(3.0), off(NEVER_M_S)
     without = line("without GPS: yaw error, RMS", "deg", lost, "<=", 5.0)
 
-    panel = Panel("Hover for 10 minutes with a GPS of 5 Hz", "time, minutes", "yaw error, deg")
+    panel = Panel("Hover for 10 minutes with a GPS of 5 Hz", "yaw error, deg", "time, minutes")
     shown = {"course used at any speed": used_first, "course used above 3 m/s": gated_first}
     panel.curves(logs[0].truth["t_s"][SETTLED:] / 60.0, shown, (RED, BLUE), lw=1.5)
     return Finding(
         lines=[without, line("course used at any speed: yaw error, RMS", "deg", used, "<=", 5.0)],
         condition="if the GPS course is used only above 3 m/s",
         conditional_lines=[without, line("course used above 3 m/s: yaw error, RMS", "deg", gated, "<=", 5.0)],
-        summary=f"Without GPS the yaw error of the hovering craft is {lost:.1f} degrees. With a GPS course that is used "
+        summary=f"Without GPS the yaw error of the hovering craft is {lost:.1f} degrees. With a GPS course used "
         f"at any speed it is {used:.0f}, because at rest the course is noise; if it is used only above 3 m/s, "
         f"{gated:.1f}.",
         panels=[panel],

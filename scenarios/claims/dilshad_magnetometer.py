@@ -80,7 +80,7 @@ def dilshad_hard_iron(seeds: Sequence[int]) -> Finding:
     offset = rms(np.array([_missed_ut(seed) for seed in seeds]))
     raw, hard, soft = (rms(np.array([highest(np.abs(error)) for error in of])) for of in errors.values())
 
-    panel = Panel("A level magnetometer at all headings", "heading, deg", "heading error, deg", xticks=ALL_ROUND)
+    panel = Panel("A level magnetometer at all headings", "heading error, deg", "heading, deg", xticks=ALL_ROUND)
     heading = _level_circle(seeds[0])[0] % (2.0 * math.pi)
     order = np.argsort(heading)
     shown = {name: of[0][order] for name, of in errors.items()}
@@ -149,15 +149,8 @@ def dilshad_tilt_compensation() -> Finding:
 
     panels = []
     for case, of in errors.items():
-        panels.append(
-            Panel(
-                f"{case.capitalize()}, {TILT_DEG:.0f}°",
-                "heading, deg",
-                "heading error, deg",
-                xticks=ALL_ROUND,
-                ylim=(-180.0, 180.0),
-            )  # fmt: skip
-        )
+        title = f"{case.capitalize()}, {TILT_DEG:.0f}°"
+        panels.append(Panel(title, "heading error, deg", "heading, deg", xticks=ALL_ROUND, ylim=(-180.0, 180.0)))
         panels[-1].curves(np.arange(0.0, 360.0, 2.0), of, (FAINT, RED, GREEN), ".", ms=3)
     return Finding(
         lines=lines("as printed"),

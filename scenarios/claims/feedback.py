@@ -57,10 +57,7 @@ def correction_sign() -> Finding:
     reference vector, for yaw and for roll and pitch.
     """
     yaw, roll_pitch, exchanged = (_corrected_deg(kind) for kind in ("yaw", "roll-pitch", "exchanged"))
-    panel = Panel(
-        "An estimate that is 9 degrees off, with each correction", "time, s", "error, deg", legend="right",
-        yticks=(0, 45, 90, 135, 180),
-    )  # fmt: skip
+    panel = Panel("An estimate 9 degrees off", "error, deg", legend="right", yticks=(0, 45, 90, 135, 180))
     t_s = (np.arange(len(yaw)) + 1) * STEP_S
     panel.curve(t_s, roll_pitch, RED, "roll-pitch, Eqn 27 as printed: estimate x reference")
     panel.curve(t_s, exchanged, GREEN, "roll-pitch with the factors exchanged")
@@ -110,9 +107,9 @@ def offset_removed() -> Finding:
         left[name] = np.degrees(np.linalg.norm(out["gyro_bias_b_rad_s"] - offset, axis=1))
     false = _false_offset_deg_s()
 
-    offsets = Panel("Offset not learnt", "time, s", "deg/s", yscale="log")
+    offsets = Panel("Offset not learnt", "deg/s", log="y")
     offsets.curves(t_s, {name: left[name] for name in ("constant", "warming up")}, (BLUE, ORANGE))
-    angles = Panel("Attitude error", "time, s", "deg", yscale="log")
+    angles = Panel("Attitude error", "deg", log="y")
     angles.curves(t_s, error, (FAINT, BLUE, ORANGE))
     constant = [
         line("constant: offset not learnt", "deg/s", left["constant"][-1], "<=", 0.05),
@@ -161,14 +158,10 @@ def ten_seconds(seeds: Sequence[int]) -> Finding:
     ours = WEIGHTS.index(0.3)
 
     x = "weight of the roll-pitch correction, 1/s"
-    recovery = Panel(
-        "Time to reduce 35 degrees to a tenth", x, "recovery, s", xscale="log", yscale="log", xticks=WEIGHTS
-    )
+    recovery = Panel("Time to reduce 35 degrees to a tenth", "recovery, s", x, log="xy", xticks=WEIGHTS)
     recovery.curve(WEIGHTS, times, BLUE, style="o-")
     recovery.level(10.0, RED, "10 s", side="left")
-    error = Panel(
-        "Error in turns in wind", x, "inclination error, deg RMS", xscale="log", xticks=WEIGHTS, ylim=(0.0, None)
-    )
+    error = Panel("Error in turns in wind", "inclination error, deg RMS", x, log="x", xticks=WEIGHTS, ylim=(0.0, None))
     error.curve(WEIGHTS, flown, BLUE, style="o-")
     error.curve(WEIGHTS[ours], flown[ours], RED, style="o", ms=9, mfc="none")
     return Finding(
@@ -226,9 +219,7 @@ def drifts_standing(seeds: Sequence[int]) -> Finding:
     in a few seconds.
     """
     drifts, unexplained, cancelled = [], [], []
-    panel = Panel(
-        "Heading of an aeroplane that stops for a minute", "time, s", "heading error, deg", xlim=(60.0, END_S)
-    )
+    panel = Panel("Heading of an aeroplane that stops for a minute", "heading error, deg", xlim=(60.0, END_S))
     panel.shade(PAUSE.stop_s + PAUSE.change_s, PAUSE.go_s, "stopped")
     for i, seed in enumerate(seeds):
         log = sensed(PAUSE, END_S, "generic", {}, seed)

@@ -63,10 +63,7 @@ def drift_per_minute(seeds: Sequence[int]) -> Finding:
     def lines(case: str) -> list[Row]:
         return [line(f"{GYROS[s]}, {case}", "deg/min", drift[s, case], "<=", FEW_DEG) for s in AUTHORS]
 
-    panel = Panel(
-        "Attitude error after a minute on gyros alone", "", "deg per axis after a minute, RMS", legend="upper right",
-        columns=4, yscale="log", ylim=(0.5, 800.0),
-    )  # fmt: skip
+    panel = Panel("Error after a minute on gyros alone", "deg per axis, RMS", log="y", columns=4, ylim=(0.5, 800.0))
     bars = {GYROS[s]: ([drift[s, c] for c in cases], col) for s, col in zip(GYROS, (FAINT, BLUE, ORANGE), strict=True)}
     panel.bars(list(cases), bars)
     panel.level(FEW_DEG, RED, label="a few degrees")
@@ -98,10 +95,7 @@ def offset_at_power_up(seeds: Sequence[int]) -> Finding:
     each = np.array([[sizes(suite, seed) for seed in seeds] for suite in GYROS])
     delivered, rested, swayed = np.sqrt(np.mean(np.square(each), axis=1)).T
 
-    panel = Panel(
-        "Gyro offset left after averaging for two seconds at power-up", "", "offset left, deg/s, RMS",
-        legend="upper left", columns=3, ylim=(0.0, 9.5),
-    )  # fmt: skip
+    panel = Panel("Gyro offset left after averaging for two seconds", "deg/s RMS", columns=3, ylim=(0.0, 9.5))
     bars = {"not measured": (delivered, FAINT), "swaying in a hand": (swayed, ORANGE), "at rest": (rested, BLUE)}
     panel.bars(list(GYROS.values()), bars, "{:.2f}")
     return Finding(
@@ -137,12 +131,12 @@ def gain_as_offset() -> Finding:
     expected_over = min(swept % 360.0, 360.0 - swept % 360.0)
     apart = float(np.linalg.norm(learnt[-1] - predicted) / np.linalg.norm(predicted))
 
-    rates = Panel("The integral learns the gain error as an offset", "time in the turn, s", "offset, deg/s")
+    rates = Panel("The integral learns the gain error as an offset", "offset, deg/s", "time in the turn, s")
     for axis, name, colour in ((1, "learnt, y gyro", ORANGE), (2, "learnt, z gyro", BLUE)):
         rates.curve(t_s, learnt[:, axis], colour, name)
         rates.level(predicted[axis], colour)
     rates.note("dashed: 10 % of the true rate", 120.0, 0.65)
-    angle = Panel("and the attitude error vanishes", "time in the turn, s", "attitude error, deg")
+    angle = Panel("and the attitude error vanishes", "attitude error, deg", "time in the turn, s")
     angle.curves(t_s, {"without the integral term": left, "with it": error}, (FAINT, BLUE))
     return Finding(
         lines=[
@@ -172,14 +166,13 @@ def sensitive_gyros(seeds: Sequence[int]) -> Finding:
     sensitive, coarse = (rms(values) for values in each.values())
 
     panel = Panel(
-        "Turns in wind: inclination error with sensitive and less sensitive gyros", "", "inclination error, deg RMS",
-        columns=2, ylim=(0.0, 1.25 * max(values.max() for values in each.values())),
-    )  # fmt: skip
+        "Inclination error in turns in wind", "deg RMS", columns=2, ylim=(0.0, 1.25 * np.max([*each.values()]))
+    )
     bars = {gyro: (values, colour) for (gyro, values), colour in zip(each.items(), (ORANGE, BLUE), strict=True)}
     panel.bars([f"seed {seed}" for seed in seeds], bars)
     return Finding(
         lines=[line("inclination error, less sensitive over sensitive", "", coarse / sensitive, "<=", 1.2)],
-        summary=f"In the same turns in the same wind the inclination error is {sensitive:.2f} degrees RMS with gyros of "
+        summary=f"In the same turns and wind the inclination error is {sensitive:.2f} degrees RMS with gyros of "
         f"15 mV/(deg/s) and {coarse:.2f} with gyros of 3.3, whose resolution is almost five times coarser.",
         panels=[panel],
     )
@@ -204,7 +197,7 @@ def accelerometer_offset() -> Finding:
     turning = tilt_deg(begin(GyroOnly(), start).replay(misread(log, offset_rad_s=offset))["R_eb"], log)
     expected = math.degrees(math.asin(BIAS_G))
 
-    panel = Panel("Ten minutes of straight flight with an offset", "time, min", "inclination error, deg")
+    panel = Panel("Ten minutes of straight flight with an offset", "inclination error, deg", "time, min")
     errors = {"gyro, 0.1 deg/s, uncorrected": turning, "accelerometer, 0.02 g": leaning}
     panel.curves(t_s / 60.0, errors, (ORANGE, BLUE))
     return Finding(

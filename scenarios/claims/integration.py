@@ -55,9 +55,7 @@ def sampled_rate() -> Finding:
     first, mean = (np.array([error_deg(a, averaged) for a in accelerations]) for averaged in (False, True))
     order = float(np.polyfit(np.log(accelerations), np.log(first), 1)[0])
 
-    panel = Panel(
-        "Attitude error after spinning up for one second", "rotational acceleration, deg/s²", "attitude error, deg"
-    )
+    panel = Panel("Error after spinning up for one second", "attitude error, deg", "rotational acceleration, deg/s²")
     errors = {"rate at the beginning of each step": first, "mean rate over each step": mean}
     panel.curves(accelerations, errors, (ORANGE, GREEN), "o-")
     return Finding(
@@ -88,7 +86,7 @@ def angles_do_not_add() -> Finding:
         pitch[k] = math.degrees(math.asin(np.clip(-R[2, 0], -1.0, 1.0)))
     error = math.degrees(rotation_error_rad(R, at.R_eb[-1]))
 
-    panel = Panel("Integrated pitch rate in a level turn at 30 degrees of bank", "time in the turn, s", "pitch, deg")
+    panel = Panel("Integrated pitch rate in a level turn at 30 degrees of bank", "pitch, deg", "time in the turn, s")
     panel.curve(t_s, summed[:, 1], ORANGE, "pitch rate, integrated")
     panel.curve(t_s, 0.0 * t_s, FAINT, "true pitch", "--", lw=1, zorder=5)
     panel.curve(t_s, pitch, BLUE, "pitch of the matrix")
@@ -97,7 +95,7 @@ def angles_do_not_add() -> Finding:
             line("integrated pitch rate: error after a minute", "deg", abs(summed[-1, 1]), ">=", 90.0),
             line("matrix: attitude error after a minute", "deg", error, "<=", 1.0),
         ],
-        summary=f"In a minute of level turning the pitch gyro integrates to {summed[-1, 1]:.0f} degrees of pitch, while "
+        summary=f"In a minute of level turning the pitch rate integrates to {summed[-1, 1]:.0f} degrees of pitch, but "
         f"the true pitch is zero; the matrix, from the same rates, has an error of {error:.2f} degrees.",
         panels=[panel],
     )
@@ -123,10 +121,7 @@ def second_order() -> Finding:
     errors = np.array([_one_step_error(np.radians(rate), STEP_S) for rate in rates])
     order = float(np.polyfit(np.log(rates), np.log(errors), 1)[0])
 
-    panel = Panel(
-        "Error of one step of 20 ms, by turn rate", "turn rate, deg/s", "largest error of an element, %",
-        xscale="log", yscale="log",
-    )  # fmt: skip
+    panel = Panel("Error of one step of 20 ms", "largest error of an element, %", "turn rate, deg/s", log="xy")
     panel.curve(rates, errors * 100.0, BLUE)
     panel.curve(RATE_DEG_S, percent, BLUE, style="o")
     panel.level(0.02, text="0.02 % as claimed", side="left")
@@ -171,18 +166,10 @@ def time_step(seeds: Sequence[int]) -> Finding:
     turns, loops = (values[STEPS_MS.index(20)] for values in drift.values())
     in_flight = line("in flight: error at 50 Hz minus error at 200 Hz", "deg", errors[50] - errors[200], "<=", 0.2)
 
-    alone = Panel(
-        "A minute of Eqn 17 on perfect gyros", "time step, ms", "attitude error, deg", xscale="log", yscale="log",
-        xticks=STEPS_MS,
-    )  # fmt: skip
+    alone = Panel("A minute of Eqn 17 on perfect gyros", "error, deg", "time step, ms", log="xy", xticks=STEPS_MS)
     alone.curves(STEPS_MS, drift, (BLUE, ORANGE), "o-")
     alone.upright(20.0)
-    complete = Panel(
-        "In flight, complete",
-        "time step, turns_180",
-        "inclination error, deg RMS",
-        ylim=(0.0, 1.2 * max(errors.values())),
-    )
+    complete = Panel("In flight, turns_180", "inclination error, deg RMS", ylim=(0.0, 1.2 * max(errors.values())))
     complete.bars([f"{1000 // hz} ms" for hz in RATES_HZ], {"": (list(errors.values()), BLUE)}, "{:.2f}")
     return Finding(
         lines=[

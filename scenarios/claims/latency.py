@@ -9,14 +9,7 @@ import numpy as np
 
 from estimator.interface import Array
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
-from scenarios.harness.claims.flights import (
-    TURNING_DEG,
-    course_error_deg,
-    flights,
-    pooled_rms,
-    rms_in_turns,
-    tuned,
-)
+from scenarios.harness.claims.flights import TURNING_DEG, course_error_deg, flights, pooled_rms, rms_in_turns, tuned
 from scenarios.harness.claims.motions import EQUATIONS_ONLY, sensed
 from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, Panel
 from scenarios.harness.metrics import bank_size_deg, heading_error_deg, inclination_error_deg, time_s
@@ -65,11 +58,11 @@ def gps_filter_settles() -> Finding:
     at_three = float(np.interp(3.0, after_s, response))
 
     x, shown = "s after the step", {"xlim": (-1.0, 6.0), "xticks": range(-1, 7)}
-    step = Panel("A step of velocity, inside the receiver", x, "part of the step", **shown)
+    step = Panel("A step of velocity, inside the receiver", "part of the step", x, **shown)
     step.curve(after_s, np.where(after_s > 0.0, 1.0, 0.0), FAINT, lw=1)
     step.curve(after_s, response, BLUE)
     step.note(f"{at_three:.0%} after 3 s", 3.1, 0.85, BLUE)
-    reported = Panel("The reported course: 0.3 s later", x, "course, deg", yticks=(0, 30, 60, 90), **shown)
+    reported = Panel("The reported course: 0.3 s later", "course, deg", x, yticks=(0, 30, 60, 90), **shown)
     reported.curve(after_s, np.where(after_s > 0.0, 90.0, 0.0), FAINT, lw=1, drawstyle="steps-pre")
     reported.curve(after_s[new], np.degrees(log.measured["gps_course_rad"][new]), ORANGE, style="o", ms=3)
     for panel in (step, reported):
@@ -109,7 +102,7 @@ def report_rate(seeds: Sequence[int]) -> Finding:
     slow, quick, unfiltered, _both, late, prompt = error
     by_rate, by_filter, with_latency = 1.0 - quick / slow, 1.0 - unfiltered / slow, 1.0 - prompt / late
 
-    panel = Panel("Heading error in three reversals, by receiver", "", "deg RMS, against the course", ylim=(0.0, 13.0))
+    panel = Panel("Heading error in three reversals, by receiver", "deg RMS, against the course", ylim=(0.0, 13.0))
     panel.bars(list(receivers), {"": (error, [ORANGE, ORANGE, BLUE, BLUE, RED, RED])})
     for at, text in ((0.5, "1 s filter, 0.3 s late"), (2.5, "0.3 s late"), (4.5, "1 s filter, one period late")):
         panel.note(text, at, 0.93, ha="center", fraction="y")
@@ -147,9 +140,8 @@ def reporting_latency(seeds: Sequence[int]) -> Finding:
     lost_from = next((s for s in LATENCIES_S if min(unaware[s]) > LOST_DEG), math.nan)
 
     panel = Panel(
-        "Heading error in straight flight with late fixes", "latency, s", "deg RMS, against the course",
-        legend="upper left", xticks=LATENCIES_S, yticks=(0, 45, 90, 135),
-    )  # fmt: skip
+        "Straight flight, heading error", "deg RMS", "latency, s", xticks=LATENCIES_S, yticks=(0, 45, 90, 135)
+    )
     for errors, colour, name in ((unaware, RED, "latency unknown"), (aware, BLUE, "latency known")):
         panel.curve(list(errors), [np.median(values) for values in errors.values()], colour, name)
         for latency_s, values in errors.items():
@@ -162,7 +154,7 @@ def reporting_latency(seeds: Sequence[int]) -> Finding:
             line("12 s, known: heading error of the worst flight", "deg RMS", max(aware[12.0]), "<=", SMALL_DEG),
         ],
         summary=f"In straight flight an estimator that does not know the latency fails with fixes 12 s late "
-        f"({np.median(unaware[12.0]):.0f} degrees). Much less is enough: the first flights fail at {some_from:g} s, all "
+        f"({np.median(unaware[12.0]):.0f} degrees). The first flights fail at {some_from:g} s, all "
         f"from {lost_from:g} s on. A latency of 1 s is harmless here ({max(unaware[1.0]):.1f}), but not in turns. An "
         f"estimator that knows its latency of 12 s flies straight ({np.median(aware[12.0]):.1f}).",
         panels=[panel],
@@ -191,10 +183,7 @@ def lag_ignored(seeds: Sequence[int]) -> Finding:
 
     ignored, _, matched = ([turning(bank, way) for bank in banks_deg] for way in _WAYS)
 
-    panel = Panel(
-        "Heading error in a steady turn in calm air", "commanded bank, deg", "deg RMS, against the course",
-        legend="upper left", xticks=banks_deg, ylim=(0.0, None),
-    )  # fmt: skip
+    panel = Panel("Heading error in a steady turn in calm air", "deg RMS", "commanded bank, deg", ylim=(0.0, None))
     errors = {"lag ignored": ignored, "nose filtered and delayed like the course": matched}
     panel.curves(banks_deg, errors, (RED, BLUE), "o-")
     lag = [math.degrees(1.3 * 9.81 * math.tan(math.radians(bank)) / 12.6) for bank in banks_deg]
@@ -226,10 +215,7 @@ def lag_filter(seeds: Sequence[int]) -> Finding:
     ignored, filtered, corrected = error.values()
     in_turns = [rms_in_turns(flown[way], COURSE, SETTLED_S) for way in ("filtered", "lag ignored")]
 
-    panel = Panel(
-        "Three reversals in a crosswind: estimated heading minus course", "s (grey: turning)", "deg",
-        legend="lower left", columns=3, xlim=(SETTLED_S, 160.0), ylim=(-105.0, 85.0), yticks=(-90, -45, 0, 45),
-    )  # fmt: skip
+    panel = Panel("Reversals in a crosswind: heading minus course", "deg", "s (grey: turning)", xlim=(SETTLED_S, 160.0))
     for way, (_, colour) in _WAYS.items():
         flight, name = flown[way][0], f"{way}: {error[way]:.1f} deg RMS"
         panel.curve(time_s(flight), course_error_deg(flight), colour, name, lw=1.3)

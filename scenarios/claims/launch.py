@@ -72,8 +72,8 @@ def accelerometer_dives(seeds: Sequence[int]) -> Finding:
     shallowest = max(_lowest_pitch_deg(flight) for flight in alone)
     nose = min(_lowest_pitch_deg(flight) for flight in matrix)
 
-    pitch = Panel("Pitch after the release", "s after the release", "true pitch, deg", legend="lower right")
-    height = Panel("Height", "s after the release", "m above the ground")
+    pitch = Panel("Pitch after the release", "true pitch, deg", "s after the release", legend="lower right")
+    height = Panel("Height", "m above the ground", "s after the release")
     for flown, colour, name in ((alone, RED, "accelerometer alone"), (matrix, BLUE, "matrix")):
         pitch.flights(flown, _true_pitch_deg, colour, name, -0.3, 4.0)
         height.flights(flown, height_m, colour, "", -0.3, 4.0)
@@ -132,14 +132,18 @@ def forward_acceleration(seeds: Sequence[int]) -> Finding:
     means = [_mean_over_deg(cruising, window_s) for window_s in WINDOWS_S]
     second, ten, long = (means[WINDOWS_S.index(w)] for w in (1.0, RECOVERY_S, 40.0))
 
-    throw = Panel("Hand launch: inclination error of the matrix", "s after the release", "deg", ylim=(0.0, felt + 8.0))
+    throw = Panel("Hand launch: inclination error of the matrix", "deg", "s after the release", ylim=(0.0, felt + 8.0))
     throw.flights(thrown, inclination_error_deg, BLUE, "", -0.3, 15.0)
     throw.level(felt, RED)
     throw.note("apparent inclination in the throw", 15.0, felt - 5.5, RED, ha="right")
     average = Panel(
-        "In flight: averaged forward acceleration", "averaged over, s", "apparent inclination, deg RMS", xscale="log",
-        yscale="log", xticks=WINDOWS_S, yticks=(0.1, 0.3, 1.0, 3.0),
-    )  # fmt: skip
+        "Forward acceleration in flight",
+        "as inclination, deg RMS",
+        "window, s",
+        log="xy",
+        xticks=WINDOWS_S,
+        yticks=(0.1, 1),
+    )
     average.curve(WINDOWS_S, means, BLUE, style="o-")
     return Finding(
         lines=[
@@ -171,16 +175,10 @@ def yaw_lock(seeds: Sequence[int]) -> Finding:
     latest = {w: slowest(times[w]) for w in WEIGHTS}
     gentle = sum(t > LOCK_SOON_S or math.isnan(t) for t in times[0.3])
 
-    course = Panel(
-        f"Heading after the release, W_Y = {LARGE:g}", "s after the release", "heading minus course, deg",
-        yticks=(0, 45, 90, 135, 180),
-    )  # fmt: skip
+    course = Panel(f"Heading after the release, W_Y = {LARGE:g}", "minus course, deg", yticks=(0, 45, 90, 135, 180))
     course.flights(thrown[LARGE], heading_error_deg("course"), BLUE, "", 0.0, 8.0)
     course.level(LOCKED_DEG, text="locked below 15 deg")
-    by_weight = Panel(
-        "Time to lock, by weight", "weight of the yaw correction", "s after the release", xscale="log",
-        xticks=WEIGHTS, xlim=(0.07, 3.4), ylim=(0.0, 20.0),
-    )  # fmt: skip
+    by_weight = Panel("Time to lock", "s", "weight of the yaw correction", log="x", xticks=WEIGHTS, ylim=(0.0, 20.0))
     for w in WEIGHTS:
         found = [t for t in times[w] if math.isfinite(t)]
         by_weight.cloud(w, found, BLUE if w == LARGE else ORANGE)

@@ -47,10 +47,7 @@ def renormalisation() -> Finding:
     renormalise(skewed)
     without, largest = errors[round(60.0 / STEP_S) - 1, 0], errors[:, 1].max()
 
-    panel = Panel(
-        "Orthogonality error of the rows, turning at 60 deg/s", "time, s", "largest element of R Rᵀ - 1",
-        legend="center right", xscale="log", yscale="log",
-    )  # fmt: skip
+    panel = Panel("Orthogonality error of the rows, turning at 60 deg/s", "largest element of R Rᵀ - 1", log="xy")
     panel.curves(t_s + STEP_S, {"Eqn 17 alone": errors[:, 0], "with renormalisation": errors[:, 1]}, (FAINT, BLUE))
     panel.level(SECOND_ORDER, RED, label="neglected by one step")
     return Finding(
@@ -93,8 +90,8 @@ def half_each() -> Finding:
     half, whole = (rms(residual[:, i]) for i in (0, 1))
     drift = [rms(moved[:, i]) / STEP_S for i in (0, 1)]
 
-    angles = Panel("Residual X · Y", "", "residual of one step, RMS", yticks=(), ylim=(0.0, 1.2 * max(half, whole)))
-    attitude = Panel("Attitude drift", "", "drift in a second, deg RMS", yticks=(), ylim=(0.0, 1.2 * max(drift)))
+    angles = Panel("Residual X · Y", "residual of one step, RMS", yticks=(), ylim=(0.0, 1.2 * max(half, whole)))
+    attitude = Panel("Attitude drift", "drift in a second, deg RMS", yticks=(), ylim=(0.0, 1.2 * max(drift)))
     for panel, values, form in ((angles, (half, whole), "{:.1e}"), (attitude, drift, "{:.3f}")):
         panel.bars(["half each", "all to X"], {"": (values, [BLUE, ORANGE])}, form)
     return Finding(
@@ -144,9 +141,9 @@ def any_orientation() -> Finding:
     neglected = math.degrees(0.5 * (math.radians(90.0) * STEP_S) ** 2)
 
     t_s = (np.arange(len(omega)) + 1) * STEP_S
-    way = Panel("Up, rolling on the tail, then loops", "time, s", "pitch, deg", yticks=(-90, -45, 0, 45, 90))
+    way = Panel("Up, rolling on the tail, then loops", "pitch, deg", yticks=(-90, -45, 0, 45, 90))
     way.curve(t_s, steep, FAINT)
-    errors = Panel("Attitude error", "time, s", "angle, deg", yscale="log")
+    errors = Panel("Attitude error", "angle, deg", log="y")
     shown = {"Euler angles, integrated": np.maximum(euler_error, 1e-3), "matrix": np.maximum(error, 1e-3)}
     errors.curves(t_s, shown, (ORANGE, BLUE))
     return Finding(
@@ -154,7 +151,7 @@ def any_orientation() -> Finding:
             line("error added by one step within 5 deg of the vertical", "deg", added[vertical].max(), "<=", neglected),
             line("error added by one step elsewhere", "deg", added[~vertical].max(), "<=", neglected),
         ],
-        summary=f"Pulling up to the vertical, rolling and swaying there for ten seconds, then looping: no step adds more "
+        summary=f"Pulling up to the vertical, rolling and swaying there for 10 s, then looping: no step adds more "
         f"than its second-order term, near the vertical {added[vertical].max():.3f} degrees. The matrix ends with an "
         f"error of {error[-1]:.1f} degrees; Euler angles integrated from the same rates are wrong by up to "
         f"{euler_error.max():.0f}.",

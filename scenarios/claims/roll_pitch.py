@@ -120,11 +120,11 @@ def velocity_change_in_turns() -> Finding:
     series = [tilts_deg(make(**AT_ONCE), looping, 500) for make in (paper_of_2009, note_of_2011)]
     loops_old, loops_new = (rms(tilt) for tilt in series)
 
-    steady = Panel("Steady turns in calm air", "bank, deg", "inclination error RMS, deg")
+    steady = Panel("Steady turns in calm air", "inclination error RMS, deg", "bank, deg")
     steady.curve(BANKS_DEG, [attack_costs_deg(log) for log in logs.values()], FAINT, "closed form", "--")
     steady.curve(BANKS_DEG, list(old.values()), ORANGE, "paper of 2009", "o")
     steady.curve(BANKS_DEG, list(new.values()), BLUE, "note of 2011", "o-")
-    looped = Panel("Three loops in calm air", "time, s", "inclination error, deg")
+    looped = Panel("Three loops in calm air", "inclination error, deg")
     for tilt, colour in zip(series, (ORANGE, BLUE), strict=True):
         looped.curve(looping.truth["t_s"][500:], tilt, colour, lw=1.5)
 
@@ -159,8 +159,7 @@ def reported_velocity() -> Finding:
     (turn, loops), (turn_matched, loops_matched) = (map(rms, tilts.values()) for tilts in (as_reported, matched))
 
     panels = [
-        Panel(name, "time, s", "inclination error, deg", ylim=(0.0, top))
-        for name, top in zip(logs, (4.0, None), strict=True)
+        Panel(name, "inclination error, deg", ylim=(0.0, top)) for name, top in zip(logs, (4.0, None), strict=True)
     ]
     for panel, (name, log) in zip(panels, logs.items(), strict=True):
         tilts = {"late reports as they are": as_reported[name], "accelerometer filtered and delayed": matched[name]}
@@ -200,7 +199,7 @@ def velocity_change_in_wind() -> Finding:
     old, course, nose, compass = (values[WINDS_M_S.index(5.0)] for values in tilts.values())
     omega_rad_s = float(np.median(np.linalg.norm(logs[0.0].truth["omega_b_rad_s"][SETTLED:], axis=1)))
 
-    panel = Panel("A turn at 35° of bank in wind", "wind, m/s", "inclination error RMS, deg")
+    panel = Panel("A turn at 35° of bank in wind", "inclination error RMS, deg", "wind, m/s")
     winds = np.linspace(0.0, WINDS_M_S[-1], 50)
     closed = [wind_costs_deg(wind, omega_rad_s) for wind in winds]
     panel.curve(winds, closed, FAINT, "paper of 2009, closed form", "--")
@@ -244,10 +243,7 @@ def any_vehicle() -> Finding:
     old = tilts(paper_of_2009(w_y=0.0, **AT_ONCE), logs[circling])
     worst = {name: highest(tilt) for name, tilt in new.items()}
 
-    panel = Panel(
-        "A multi-rotor in circles of 10 m at 5 m/s, always heading north", "time, s", "inclination error, deg",
-        legend="center right", ylim=(0.0, 14.0),
-    )  # fmt: skip
+    panel = Panel("A multi-rotor in circles, always heading north", "inclination error, deg", ylim=(0.0, 14.0))
     shown = {"paper of 2009": old, "note of 2011": new[circling]}
     panel.curves(logs[circling].truth["t_s"][SETTLED:], shown, (ORANGE, BLUE))
     return Finding(
@@ -288,7 +284,7 @@ def velocity_change_at_launch(seeds: Sequence[int]) -> Finding:
 
     panels = []
     for flown, title in ((unknown, "Heading unknown at the launch"), (known, "Heading known")):
-        panel = Panel(title, "s after the release", "inclination error, deg", ylim=(0.0, 30.0))
+        panel = Panel(title, "inclination error, deg", "s after the release", ylim=(0.0, 30.0))
         for flight in flown:
             panel.flights([flight], inclination_error_deg, BLUE if survived(flight).value else RED, "", -1.0, 6.0)
         if survive(flown) < 1.0:

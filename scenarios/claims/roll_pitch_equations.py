@@ -76,7 +76,7 @@ def velocity_change_signs() -> Finding:
 
     panels = []
     for title, tilts in (("Eqn 4 as printed", printed), ("Factors exchanged", exchanged)):
-        panels.append(Panel(title, "time, s", "inclination error, deg"))
+        panels.append(Panel(title, "inclination error, deg"))
         panels[-1].curves(logs["at rest"].truth["t_s"], tilts, (BLUE, GREEN, ORANGE))
     return Finding(
         lines=[
@@ -105,10 +105,7 @@ def yaw_from_acceleration() -> Finding:
         errors[bank] = np.degrees(np.abs(heading_error_rad(R, log.truth["R_eb"])))
     straight, turning = float(errors[0.0][-1]), float(errors[BANK_DEG][-1])
 
-    panel = Panel(
-        "A heading error of 30 degrees vanishes in turns, without a yaw reference", "time, s", "heading error, deg",
-        legend="center right",
-    )  # fmt: skip
+    panel = Panel("A heading error of 30 degrees vanishes in turns", "heading error, deg")
     shown = {f"{bank:.0f}° of bank" if bank else "straight flight": error for bank, error in errors.items()}
     panel.curves(log.truth["t_s"], shown, (FAINT, ORANGE, BLUE, GREEN))
     return Finding(
@@ -158,9 +155,7 @@ def summed_between_reports(seeds: Sequence[int]) -> Finding:
 
     panels = []
     for title, tilts in (("Perfect sensors", clean), ("Cheap gyros and accelerometers", cheap)):
-        panel = Panel(
-            title, "GPS rate, Hz", "inclination error RMS, deg", xscale="log", xticks=rates_hz, ylim=(0.0, None)
-        )
+        panel = Panel(title, "inclination error RMS, deg", "GPS rate, Hz", log="x", xticks=rates_hz, ylim=(0.0, None))
         shown = {"sampled at the report": tilts[:, 1], "summed between reports": tilts[:, 0]}
         panel.curves(rates_hz, shown, (RED, BLUE), "o-")
         panels.append(panel)

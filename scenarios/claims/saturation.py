@@ -39,9 +39,7 @@ def saturated_accelerometer() -> Finding:
     clips_deg = math.degrees(math.acos(1.0 / RANGES_G[0]))
     tight = BANKS_DEG.index(75.0)
 
-    panel = Panel(
-        "Inclination error after a minute of steady turning", "bank, deg", "inclination error, deg", legend="upper left"
-    )
+    panel = Panel("Inclination error after a minute of steady turning", "inclination error, deg", "bank, deg")
     panel.curve(BANKS_DEG, narrow, ORANGE, "range of 3 g", "o-")
     panel.curve(BANKS_DEG, wide, BLUE, "range of 6 g", "o-")
     panel.curve(BANKS_DEG, found, GREEN, "range of 3 g, clipped readings ignored", "--")
@@ -93,14 +91,14 @@ def area_not_seen() -> Finding:
     measured, areas = (np.array([of(peak) for peak in peaks]) for of in (_pulse_error_deg, _area_deg))
     apart = float(np.abs(measured - areas).max())
 
-    pulse = Panel("Pitch rate beyond the range of the gyro", "time, s", "pitch rate, deg/s", legend="lower center")
+    pulse = Panel("Pitch rate beyond the range of the gyro", "pitch rate, deg/s", legend="lower center")
     fine = np.linspace(0.0, PULSE_S, 200)
     true = PEAK_DEG_S * np.sin(np.pi * fine / PULSE_S)
     clipped = np.minimum(true, RANGE_DEG_S)
     pulse.curves(fine, {"true rate": true, "gyro reading": clipped}, (BLUE, ORANGE))
     pulse.between(fine, clipped, true, RED, alpha=0.18)
     pulse.note(f"{_area_deg(PEAK_DEG_S):.0f} deg", 0.84, 120.0, RED)
-    angle = Panel("The lost angle is the area", "peak of the rate, deg/s", "angle, deg")
+    angle = Panel("The lost angle is the area", "angle, deg", "peak of the rate, deg/s")
     angle.curve(peaks, areas, FAINT, "area between the two", "--")
     angle.curve(peaks, measured, BLUE, "error of the matrix", "o", ms=4)
     return Finding(
@@ -138,10 +136,7 @@ def saturation_erased(seeds: Sequence[int]) -> Finding:
     mean_s, slowest_s = float(np.mean(erased[0.3])), float(np.max(erased[0.3]))
     slack = sum(math.isfinite(t) for t in erased[0.06])
 
-    panel = Panel(
-        "After three loops beyond the range of the gyros", "time after the third loop, s", "inclination error, deg",
-        ylim=(0.0, None),
-    )  # fmt: skip
+    panel = Panel("After three loops beyond the gyro range", "inclination error, deg", "time after the third loop, s")
     for w, colour in ((0.06, FAINT), (0.3, BLUE)):
         panel.traces([(one.t_s - one.t_s[0], one.value) for one in series[w]], colour, f"a weight of {w:g}", lw=1.3)
     panel.level(ERASED_DEG, RED, label="counts as removed")
@@ -151,8 +146,8 @@ def saturation_erased(seeds: Sequence[int]) -> Finding:
             line("time to stay below 10 deg, mean", "s", mean_s, "<=", IN_ORDER_OF_S),
             line("time to stay below 10 deg, longest", "s", slowest_s, "<=", 2.0 * IN_ORDER_OF_S),
         ],
-        summary=f"Gyros with a range of 100 deg/s have an error of {left:.0f} degrees after loops at 110 deg/s and more. "
-        f"With a weight of 0.3 it is removed after {mean_s:.0f} s on average; with a fifth of that weight, {slack} of "
-        f"{len(seeds)} flights are below 10 degrees within 40 s.",
+        summary=f"Gyros with a range of 100 deg/s have an error of {left:.0f} degrees after loops at 110 deg/s and "
+        f"more. With a weight of 0.3 it is removed after {mean_s:.0f} s on average; with a fifth of that "
+        f"weight, {slack} of {len(seeds)} flights are below 10 degrees within 40 s.",
         panels=[panel],
     )

@@ -78,13 +78,10 @@ def starlino_weights(seeds: Sequence[int]) -> Finding:
     noise = [_noise_left(seed, (*weights, S_G)) for seed in seeds]
     percent = 100.0 * np.sqrt(np.mean(np.square(noise), axis=0))
 
-    response = Panel("Response to an inclination error of 10°", "time, s", "inclination error, deg")
+    response = Panel("Response to an inclination error of 10°", "inclination error, deg")
     shown = {f"gyro weight {s_g:.0f} times the accelerometer's": tilt for s_g, tilt in falling.items()}
     response.curves(ten_s.truth["t_s"], shown, (ORANGE, BLUE, GREEN))
-    quiet = Panel(
-        "Accelerometer noise left", "weight of the gyro, times the accelerometer's", "noise left, %", xscale="log",
-        yscale="log", xticks=(2, 20, 200), yticks=(5, 10, 20, 40),
-    )  # fmt: skip
+    quiet = Panel("Accelerometer noise left", "%", "gyro weight", log="xy", xticks=(2, 20, 200), yticks=(5, 10, 20, 40))
     w = S_A / (weights + S_A)
     quiet.curve(weights, 100.0 * np.sqrt(w / (2.0 - w)), FAINT, "closed form, white noise", "--")
     quiet.curve(weights, percent[:-1], BLUE, "measured", "o")
@@ -134,9 +131,7 @@ def starlino_dynamic_weight() -> Finding:
     banks, banks_flown = np.arange(10.0, 61.0, 2.0), (20.0, 30.0, 40.0, 50.0)
     flown = {bank: _flown_deg(bank) for bank in banks_flown}
 
-    panel = Panel(
-        "Inclination error after half a turn", "bank, deg", "largest inclination error, deg", legend="upper left"
-    )
+    panel = Panel("Inclination error after half a turn", "largest inclination error, deg", "bank, deg")
     panel.curve(banks, [_half_turn_deg(bank, math.inf) for bank in banks], FAINT, "full weight", "--")
     panel.curve(banks, [_half_turn_deg(bank) for bank in banks], BLUE, "dynamic weight, banked from the start")
     panel.curve(banks_flown, list(flown.values()), RED, "dynamic weight, in flight with rolling in and out", "o")
@@ -153,7 +148,7 @@ def starlino_dynamic_weight() -> Finding:
             line("half a turn, 40 deg of bank from the start: largest error", "deg", _half_turn_deg(40.0), "<=", 5.0),
             falling,
         ],
-        summary=f"In half a turn in flight the inclination error is {flown[30.0]:.0f} degrees at 30 degrees of bank and "
+        summary=f"In half a turn in flight the inclination error is {flown[30.0]:.0f} degrees at 30 degrees of bank, "
         f"{flown[50.0]:.0f} at 50: the specific force differs from gravity by a fifth only beyond 34 degrees, and the "
         f"half second of rolling in is enough. Speeding up at 0.4 g causes {speed_up:.0f} degrees, a fall none.",
         panels=[panel],
@@ -187,8 +182,8 @@ def starlino_drift(seeds: Sequence[int]) -> Finding:
 
     minutes, shown = log.truth["t_s"][::50] / 60.0, {"yscale": "log", "ylim": (0.1, 2000.0)}
     panels = [
-        Panel("Held in a hand for 10 minutes", "time, minutes", "inclination error, deg", **shown),
-        Panel("The same", "time, minutes", "heading error, deg", **shown),
+        Panel("Inclination, held in a hand", "inclination error, deg", "time, minutes", **shown),
+        Panel("Heading, held in a hand", "heading error, deg", "time, minutes", **shown),
     ]
     for panel, errors in zip(panels, (tilts, headings), strict=True):
         panel.curves(minutes, errors, (FAINT, ORANGE, BLUE), lw=1.5)

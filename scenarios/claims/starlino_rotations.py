@@ -62,10 +62,7 @@ def starlino_blind_axis() -> Finding:
         abs(math.degrees(heading[k] - true[k])) for heading, k in ((printed, 999), (printed, -1), (by_axis, 999))
     )
 
-    panel = Panel(
-        "Once round to the right, and back again", "time, s", "heading, deg", legend="lower center",
-        yticks=(0, 90, 180, 270, 360),
-    )  # fmt: skip
+    panel = Panel("Once round to the right, and back again", "heading, deg", yticks=(0, 90, 180, 270, 360))
     panel.curve(log.truth["t_s"], np.degrees(true), FAINT, "true", lw=4)
     shown = {"averaged about each axis": np.degrees(by_axis), "weighted mean as printed": np.degrees(printed)}
     panel.curves(log.truth["t_s"], shown, (BLUE, RED))
@@ -74,8 +71,8 @@ def starlino_blind_axis() -> Finding:
         condition="with as many turns to the left as to the right",
         conditional_lines=[line("heading error after a turn there and back", "deg", back, "<=", 5.0)],
         summary=f"The accelerometer does not see rotation about the vertical, but has its weight: of 360 degrees "
-        f"{once:.0f} are lost, 1 in 21. The way back loses as many, so {back:.1f} are left. With a mean about each axis "
-        f"separately, as in the tutorial's note for advanced readers, {by_axis_once:.1f} are lost.",
+        f"{once:.0f} are lost, 1 in 21. The way back loses as many, so {back:.1f} are left. With a mean about each "
+        f"axis separately, as in the tutorial's note for advanced readers, {by_axis_once:.1f} are lost.",
         panels=[panel],
     )
 
@@ -110,16 +107,11 @@ def starlino_half_each() -> Finding:
     shares = np.linspace(0.0, 1.0, 11)
     off = np.array([_off_after_10_s(float(share)) for share in shares])
 
-    of_cosine = Panel(
-        "Half of e to I, half to J", "cosine of the angle between I and J, e", "cosine after one correction",
-        xscale="log", yscale="log",
-    )  # fmt: skip
+    of_cosine = Panel("Half of e to I, half to J", "cosine after one correction", "cosine e between I and J", log="xy")
     of_cosine.curve(cosines, left, BLUE, "measured")
     of_cosine.curve(cosines, cosines**3 / 4.0, FAINT, "e³/4", "--")
     of_cosine.curve(cosines, cosines, FAINT, "e", ":")
-    of_share = Panel(
-        "After 10 s at 60 deg/s", "share of the error applied to I", "attitude error, deg", ylim=(0.0, 4.0)
-    )
+    of_share = Panel("After 10 s at 60 deg/s", "attitude error, deg", "share applied to I", ylim=(0.0, 4.0))
     of_share.curve(shares, off, BLUE, style="o-")
     return Finding(
         lines=[
@@ -130,7 +122,7 @@ def starlino_half_each() -> Finding:
         ],
         summary=f"A cosine of e between two unit vectors becomes e³/4: from 0.1 it falls to 0.00025. Half each is the "
         f"best share: after 10 s at 60 deg/s about a tilted axis the attitude error is {off[5]:.1f} degrees, "
-        f"{off[0]:.1f} if one vector takes all. Most of it comes from the third vector, which is computed from the two.",
+        f"{off[0]:.1f} if one vector takes all. Most of it comes from the third vector, computed from the two.",
         panels=[of_cosine, of_share],
     )
 
@@ -157,10 +149,7 @@ def starlino_gyro_sign() -> Finding:
     printed, reversed_ = _gyro_heading(log, 1.0), _gyro_heading(log, -1.0)
     off, right = (rms(np.degrees(heading - true)) for heading in (printed, reversed_))
 
-    panel = Panel(
-        "A body that turns by 60° to and fro", "time, s", "heading, deg", legend="upper center", columns=3,
-        ylim=(-75.0, 110.0),
-    )  # fmt: skip
+    panel = Panel("A body that turns by 60° to and fro", "heading, deg", columns=3, ylim=(-75.0, 110.0))
     panel.curve(log.truth["t_s"], np.degrees(true), FAINT, "true", lw=4)
     shown = {"sign of the gyro reversed": np.degrees(reversed_), "as printed": np.degrees(printed)}
     panel.curves(log.truth["t_s"], shown, (BLUE, RED))

@@ -97,10 +97,7 @@ def _wrong_sign(flight: Flight) -> int:
 
 
 def _square(flown: Sequence[Flight]) -> Panel:
-    panel = Panel(
-        "An inverted square in flight", "time, s", "deg to the right of the first leg", legend="upper left",
-        yticks=(0, 90, 180, 270),
-    )  # fmt: skip
+    panel = Panel("An inverted square in flight", "deg to the right of the first leg", yticks=(0, 90, 180, 270))
     shown = [(f, (time_s(f) > FIRST_S) & (time_s(f) < FIRST_S + LEGS * LEG_S)) for f in flown]
     panel.traces([(time_s(f)[at] - FIRST_S, _turned_deg(f)[at]) for f, at in shown], GREEN, "course")
     flight, at = shown[0]
@@ -130,12 +127,10 @@ def upside_down(seeds: Sequence[int]) -> Finding:
     true_deg_s = math.degrees(GRAVITY_M_S2 * math.tan(BANK_RAD) / 12.6)
     rate_error = float(np.abs(turn_deg_s - true_deg_s)[later].max())
 
-    error = Panel("Error of the way to turn", "time, s", "deg, the worst of 24 directions", xlim=(0.0, 40.0))
+    error = Panel("Error of the way to turn", "deg, the worst of 24 directions", xlim=(0.0, 40.0))
     error.curve(t_s, steering, BLUE, "upside down")
     error.curve(t_s, upright, ORANGE, "upright", "--", lw=1.2)
-    elements = Panel(
-        "Estimated upside down", "time, s", "r_zz; turn rate over true", legend="center right", xlim=(0.0, 40.0)
-    )
+    elements = Panel("Estimated upside down", "r_zz; turn rate over true", legend="center right", xlim=(0.0, 40.0))
     elements.curves(t_s, {"r_zz": r_zz, "turn rate / true": turn_deg_s / true_deg_s}, (BLUE, ORANGE))
     elements.level(0.0)
     return Finding(

@@ -103,10 +103,7 @@ def van_zundert_half_degree() -> Finding:
     apart = {name: apart_deg(as_reported(log.measured, **reading), true) for name, reading in readings.items()}
     reported, added, body_frame, both = (float(np.nanmax(angle)) for angle in apart.values())
 
-    panel = Panel(
-        "Turned by hand for two minutes: difference from the original", "time, s", "largest Euler difference, deg",
-        legend="upper left",
-    )  # fmt: skip
+    panel = Panel("Turned by hand: difference from the original", "largest Euler difference, deg")
     panel.curves(log.truth["t_s"], apart, (RED, ORANGE, BLUE, GREEN), lw=1.5)
     panel.level(TARGET_DEG, text="target")
     return Finding(
@@ -142,16 +139,16 @@ def van_zundert_offset() -> Finding:
     }
     set_to, added = (float(tilt[-1]) for tilt in tilts.values())
 
-    panel = Panel("At rest with gyro offsets of 0.8 and 0.6 deg/s", "time, minutes", "inclination error, deg")
+    panel = Panel("At rest with gyro offsets of 0.8 and 0.6 deg/s", "inclination error, deg", "time, minutes")
     panel.curves(log.truth["t_s"] / 60.0, tilts, (RED, BLUE))
     return Finding(
-        lines=[line("integral set: inclination error after 10 minutes at rest", "deg", set_to, "<=", 0.5)],
+        lines=[line("integral set: error after 10 minutes at rest", "deg", set_to, "<=", 0.5)],
         condition="if the saturated sum is added to the integral, as in the code",
-        conditional_lines=[line("integral added: inclination error after 10 minutes at rest", "deg", added, "<=", 0.5)],
-        summary=f"Set to its saturated sum, the integral never exceeds 0.04 deg/s: gyro offsets of 0.8 and 0.6 deg/s in "
-        f"roll and pitch cause a constant inclination error of {set_to:.1f} degrees ({_tilt_of_offset_deg():.1f} in "
-        f"closed form: the rest of the offset over k_P). If the sum is added every 5 s, as in the code, the error after "
-        f"10 minutes is {added:.2f}.",
+        conditional_lines=[line("integral added: error after 10 minutes at rest", "deg", added, "<=", 0.5)],
+        summary=f"Set to its saturated sum, the integral never exceeds 0.04 deg/s: gyro offsets of 0.8 and 0.6 deg/s "
+        f"in roll and pitch cause a constant inclination error of {set_to:.1f} degrees ({_tilt_of_offset_deg():.1f} in "
+        f"closed form: the rest of the offset over k_P). If the sum is added every 5 s, as in the code, the error "
+        f"after 10 minutes is {added:.2f}.",
         panels=[panel],
     )
 
@@ -181,7 +178,7 @@ def van_zundert_spin_gain() -> Finding:
     log = clean_log("loops")
     tilt_corrected, tilt_old = (rms(_flown_tilts_deg(log, quirks, 500)) for quirks in ways.values())
 
-    panel = Panel("Increase of the feedback gain with rotation", "rate of rotation, deg/s", "factor", ylim=(0.0, 11.0))
+    panel = Panel("Increase of the feedback gain with rotation", "factor", "rate of rotation, deg/s", ylim=(0.0, 11.0))
     panel.curves(spins, gains, (BLUE, RED))
     return Finding(
         lines=[
@@ -221,7 +218,7 @@ def van_zundert_normalisation() -> Finding:
     panels = []
     for i, (title, y) in enumerate((("Length of the rows", "largest error of a length"),
                                     ("Angle between rows", "largest cosine"))):  # fmt: skip
-        panel = Panel(title, "rate of rotation, deg/s", y, xscale="log", yscale="log", ylim=(1e-17, 1.0))
+        panel = Panel(title, y, "rate of rotation, deg/s", log="xy", ylim=(1e-17, 1.0))
         shown = {name: np.maximum(values[:, i], 1e-16) for name, values in left.items()}
         panel.curves(rates, shown, (BLUE, ORANGE), "o-", ms=3, lw=1.5)
         panels.append(panel)
@@ -231,7 +228,7 @@ def van_zundert_normalisation() -> Finding:
             line("Taylor series: error of a row's length at 300 deg/s", "", taylor_length, ">=", 1e-12),
         ],
         summary=f"When turning at 300 deg/s with 50 steps per second, the error of the lengths of the rows is "
-        f"{length:.0e}; with the Taylor series of 2009 it is {taylor_length:.0e}. Neither makes the right angles exact: "
+        f"{length:.0e}; with the Taylor series of 2009 it is {taylor_length:.0e}. Neither makes right angles exact: "
         f"the largest cosine is {slant:.0e} and {taylor_slant:.0e}, because half of the error is computed with rows "
         "that are not of unit length yet.",
         panels=panels,
@@ -260,7 +257,7 @@ def van_zundert_sensors_decide() -> Finding:
 
     panels = []
     for name, log in flown.items():
-        panels.append(Panel(f"{name.capitalize()}, perfect sensors", "time, s", "inclination error, deg"))
+        panels.append(Panel(f"{name.capitalize()}, perfect sensors", "inclination error, deg"))
         shown = {"July 2013": july[name], "quirks corrected": none[name]}
         panels[-1].curves(log.truth["t_s"][1000:], shown, (RED, BLUE), lw=1.5)
     return Finding(

@@ -81,12 +81,9 @@ def vertical_flight() -> Finding:
         w: settled_after_s(Series(t_s, e, everywhere).within(CLIMB.on_s, END_S), BACK_DEG) for w, e in error.items()
     }
 
-    strength = Panel(
-        "Eqn 23 for a course at right angles to the nose", "time, s", "strength, relative to level flight",
-        xlim=(40.0, END_S), ylim=(0.0, 1.15),
-    )  # fmt: skip
+    strength = Panel("Eqn 23, course across the nose", "relative to level flight", xlim=(40.0, END_S), ylim=(0.0, 1.15))
     strength.curve(t_s, nose, BLUE)
-    angle = Panel("Attitude error", "time, s", "deg", legend="upper left", xlim=(40.0, END_S), ylim=(0.0, None))
+    angle = Panel("Attitude error", "deg", legend="upper left", xlim=(40.0, END_S), ylim=(0.0, None))
     angle.curves(t_s, {f"W_Y = {w:g}": e for w, e in error.items()}, (ORANGE, BLUE))
     angle.level(BACK_DEG, RED)
     for panel in (strength, angle):

@@ -28,16 +28,19 @@ class Panel:
     Parameters
     ----------
     title       printed at the top left
-    x, y        labels of the axes, with units
-    legend      where the legend goes, if any curve has a label
+    y, x        labels of the axes, with units
+    log         axes with a logarithmic scale: "x", "y" or "xy"
+    legend      where the legend goes, if any curve has a label; empty for no legend
     columns     number of columns of the legend
-    **settings  of the axes, as `matplotlib.axes.Axes.set` takes them: xlim, ylim, xscale, xticks, xticklabels ...
-                Ticks without labels are labelled with their values.
+    **settings  of the axes, as `matplotlib.axes.Axes.set` takes them: xlim, ylim, xticks, yticks ...
     """
 
-    def __init__(self, title: str, x: str, y: str, *, legend: str = "best", columns: int = 1, **settings: Any) -> None:
-        self.title, self.x, self.y = title, x, y
-        self._legend = {"loc": legend, "ncols": columns}
+    def __init__(
+        self, title: str, y: str, x: str = "time, s", *, log: str = "", legend: str = "best", columns: int = 1,
+        **settings: Any,
+    ) -> None:  # fmt: skip
+        self.title, self.y, self.x = title, y, x
+        self._log, self._legend, self._columns = log, legend, columns
         self._settings = settings
         self._calls: list[Callable[[Any], object]] = []
         self._labelled = False
@@ -90,6 +93,7 @@ class Panel:
     ) -> None:
         """Bars above `names` with their values written on them: `groups` are label -> (values, colour or colours)."""
         self._labelled |= len(groups) > 1
+        self.x = ""
         step = 0.78 / len(groups) if len(groups) > 1 else 0.62
         backed = {"bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5}, "zorder": 5}
 
@@ -136,17 +140,15 @@ class Panel:
         ax.grid(color=GRID, lw=0.6)
         for call in self._calls:
             call(ax)
-        for axis in "xy":
-            ticks = self._settings.get(f"{axis}ticks")
-            if ticks is not None:
-                self._settings.setdefault(f"{axis}ticklabels", [f"{tick:g}" for tick in ticks])
-        # Scales first: they bring ticks of their own.
-        ax.set(**dict(sorted(self._settings.items(), key=lambda item: not item[0].endswith("scale"))))
-        if "xticks" in self._settings or "yticks" in self._settings:
-            ax.minorticks_off()
-        ax.set(xlabel=self.x, ylabel=self.y)
-        if self._labelled:
-            ax.legend(**self._legend)
+        # Scales first: they bring their own ticks.
+        ax.set(**{f"{axis}scale": "log" for axis in self._log}, xlabel=self.x, ylabel=self.y)
+        ax.set(**self._settings)
+        for name, axis in (("xticks", ax.xaxis), ("yticks", ax.yaxis)):
+            if name in self._settings:
+                axis.set_ticks(self._settings[name], [f"{tick:g}" for tick in self._settings[name]])
+                ax.minorticks_off()
+        if self._labelled and self._legend:
+            ax.legend(loc=self._legend, ncols=self._columns)
 
 
 def png(panels: Sequence[Panel]) -> bytes:
