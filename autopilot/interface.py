@@ -25,6 +25,10 @@ class Mode(IntEnum):
     LOW = 11  # too near the ground: climbs, and hardly banks on its way
 
 
+# As plain integers, for kernels: numba is slow with enumerations.
+MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW = (int(m) for m in Mode)
+
+
 class Waypoint(NamedTuple):
     """A point of a route, from the launch point."""
 

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from time import perf_counter_ns
 from typing import Any
 
+from numpy.typing import NDArray
+
 from autopilot.interface import NEUTRAL, Autopilot
 from autopilot.pilot import Script
 from estimator.interface import AttitudeEstimator, HeadingReference, ImuSample
@@ -19,7 +21,6 @@ from sim.log import Flight, Log, Outcome
 from sim.oracle import Oracle
 from sim.outside.signals import Interrupted, TimedOut, check, listening
 from sim.plant import Plant, SimulationDiverged
-from sim.power_up import mean_sample
 from sim.sensors.suite import Suite
 
 Watch = Callable[[Log, int], None]  # shown the log and the number of its rows that are filled
@@ -115,3 +116,26 @@ def power_up(estimator: AttitudeEstimator, on_ground: ImuSample | None) -> None:
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, on_ground.t_s if on_ground else 0.0):
         if hasattr(estimator, "reset"):
             estimator.reset(on_ground)
+
+
+def sense(plant: Plant, suite: Suite, log: Log) -> Log:
+    """Fill the rows of `log` with the motion of `plant`, controls neutral, and what `suite` measures of it.
+
+    The open loop: no estimator, no autopilot, and every row is filled even if the plant reports an outcome.
+
+    Returns
+    -------
+    `log` itself
+    """
+    plant.reset(log)
+    suite.reset(log)
+    for k in range(len(log)):
+        plant.advance(k, NEUTRAL)
+        suite.measure(k)
+    return log
+
+
+def mean_sample(rows: NDArray[Any]) -> ImuSample:
+    """Mean inertial sample of measured rows, shape (n,), n > 0; its time is that of the last row."""
+    gyro, force = rows["gyro_b_rad_s"].mean(axis=0), rows["force_b_m_s2"].mean(axis=0)
+    return ImuSample(float(rows["t_s"][-1]), float(rows["dt_s"].sum()), gyro, force)

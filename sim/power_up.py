@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.interface import NEUTRAL
 from estimator.interface import Array, ImuSample
 from sim.clock import Rates
 from sim.log import Log
+from sim.loop import mean_sample, sense
 from sim.motion.prescribed_plant import Motion, PrescribedPlant, Rest
 from sim.motion.turn_table import TurnTable
 from sim.sensors.fitting import SuiteParams
@@ -41,17 +41,5 @@ def _measured(
     motion: Motion, duration_s: float, params: SuiteParams, rates: Rates, seed: int, flight: int
 ) -> NDArray[Any]:
     """Measured rows of the sensors of a flight on `motion`."""
-    log = Log.empty(rates.ticks(duration_s))
     plant, suite = PrescribedPlant(motion, rates), Suite(params, rates, seed, flight)
-    plant.reset(log)
-    suite.reset(log)
-    for k in range(len(log)):
-        plant.advance(k, NEUTRAL)
-        suite.measure(k)
-    return log.measured
-
-
-def mean_sample(rows: NDArray[Any]) -> ImuSample:
-    """The mean inertial sample of measured rows, its time that of the last."""
-    gyro, force = rows["gyro_b_rad_s"].mean(axis=0), rows["force_b_m_s2"].mean(axis=0)
-    return ImuSample(float(rows["t_s"][-1]), float(rows["dt_s"].sum()), gyro, force)
+    return sense(plant, suite, Log.empty(rates.ticks(duration_s))).measured

@@ -10,14 +10,13 @@ import numpy as np
 from estimator.blocks.magnetometer import Calibration, hard_iron_from_extremes
 from estimator.dilshad import heading_of_field
 from estimator.interface import Array
-from estimator.rotation import heading_rad
+from estimator.rotation import from_euler, heading_rad
 from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
 from scenarios.harness.claims.motions import DECLINATION_RAD, FIELD_E_UT, seen
 from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, Panel
 from scenarios.harness.metrics import highest, rms
 from sim.motion.hover import Hover
-from sim.motion.prescribed_plant import rotation_from_euler
 from sim.motion.turn_table import TurnTable
 
 BOARD = "dilshad_9dof"
@@ -113,7 +112,7 @@ def printed_heading_rad(m_b: Array, roll_rad: Array, pitch_rad: Array) -> Array:
 def tilted(roll_deg: float, pitch_deg: float) -> tuple[Array, Array]:
     """Attitudes with that roll and pitch at all headings, and the magnetic field in body axes."""
     yaw = np.radians(np.arange(0.0, 360.0, 2.0)) + 1e-3
-    R_eb = rotation_from_euler(math.radians(roll_deg), math.radians(pitch_deg), yaw)
+    R_eb = from_euler(math.radians(roll_deg), math.radians(pitch_deg), yaw)
     return R_eb, np.einsum("nij,i->nj", R_eb, FIELD_E_UT)
 
 

@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from estimator.interface import Array
 from estimator.premerlani import Premerlani
-from estimator.rotation import heading_error_rad
+from estimator.rotation import from_euler, heading_error_rad
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
 from scenarios.harness.claims.flights import flights, rms_of_each, tuned
 from scenarios.harness.claims.motions import STEP_S, aboard, attitude_deg, begin, misread, printed, sensed, tilt_deg
 from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, VIOLET, Panel
 from scenarios.harness.metrics import Series, inclination_error_deg, rms, settled_after_s
 from sim.log import Phase
-from sim.motion.prescribed_plant import Kinematics, SteadyTurn, StraightLevel, rotation_from_euler
+from sim.motion.prescribed_plant import Kinematics, SteadyTurn, StraightLevel
 
 TILT_DEG, WATCHED_S = 9.0, 20.0
 
@@ -140,7 +140,7 @@ WEIGHTS = (0.03, 0.1, 0.3, 1.0, 3.0)
 def _recovery_s(weight: float) -> float:
     """Time until a tenth is left of a bank error of 35 degrees, in straight flight."""
     log = sensed(StraightLevel(), 120.0)
-    wrong = log.truth["R_eb"][0] @ rotation_from_euler(np.full(1, math.radians(FROM_DEG)), 0.0, 0.0)[0]
+    wrong = log.truth["R_eb"][0] @ from_euler(np.full(1, math.radians(FROM_DEG)), 0.0, 0.0)[0]
     error = tilt_deg(begin(Premerlani(printed(w_rp=weight, k_i=0.0)), wrong).replay(log.measured)["R_eb"], log)
     return settled_after_s(Series(log.truth["t_s"], error, np.ones(len(error), bool)), TENTH)
 
@@ -201,7 +201,7 @@ class Pause:
             way += sign * self.speed_m_s * (0.5 * (since - np.sin(w * since) / w) + after)
         still = np.zeros((len(t_s), 3))
         north = np.array([1.0, 0.0, 0.0])
-        R_eb = rotation_from_euler(0.0, 0.0, 0.0 * t_s)
+        R_eb = from_euler(0.0, 0.0, 0.0 * t_s)
         p_e = way[:, None] * north - [0.0, 0.0, 60.0]
         return Kinematics(R_eb, still, p_e, speed[:, None] * north, a[:, None] * north)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimator.baselines import GyroOnly
-from estimator.interface import ImuSample
+from estimator.interface import G_M_S2, ImuSample
 from estimator.premerlani import Premerlani
 from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
@@ -14,8 +14,8 @@ from scenarios.harness.claims.flights import flights, rms_of_each
 from scenarios.harness.claims.motions import IMU_HZ, aboard, attitude_deg, begin, misread, printed, sensed, tilt_deg
 from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, Panel
 from scenarios.harness.metrics import inclination_error_deg, rms
+from sim.loop import mean_sample
 from sim.motion.prescribed_plant import HandHeld, Motion, Rest, SteadyTurn, StraightLevel
-from sim.power_up import mean_sample
 
 FEW_DEG = 5.0  # "a few degrees"
 MINUTE = round(60.0 * IMU_HZ) - 1  # the tick that ends the first minute
@@ -191,7 +191,7 @@ def accelerometer_offset() -> Finding:
     log = sensed(StraightLevel(), 600.0)
     t_s, start = log.truth["t_s"], log.truth["R_eb"][0]
     rows = log.measured.copy()
-    rows["force_b_m_s2"][:, 1] += BIAS_G * 9.80665
+    rows["force_b_m_s2"][:, 1] += BIAS_G * G_M_S2
     leaning = tilt_deg(begin(Premerlani(aboard()), start).replay(rows)["R_eb"], log)
     offset = np.radians([GYRO_DEG_S, 0.0, 0.0])
     turning = tilt_deg(begin(GyroOnly(), start).replay(misread(log, offset_rad_s=offset))["R_eb"], log)

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.blocks.screening import G_M_S2
-from estimator.interface import Array
+from estimator.interface import G_M_S2, Array
 from estimator.rotation import inclination_error_rad
 from scenarios.harness.claims.claim import Finding, Paper, claim, line
 from scenarios.harness.claims.flights import flights, hit_ground, percentage, pooled_rms, slowest, tuned

@@ -11,6 +11,7 @@ from autopilot.guidance import heading_error
 from estimator.blocks.kernels import wrap
 from estimator.interface import Array
 from estimator.premerlani import Premerlani
+from estimator.rotation import from_euler
 from scenarios.harness.claims.claim import Finding, Paper, claim, line
 from scenarios.harness.claims.flights import course_rad, flights, percentage
 from scenarios.harness.claims.motions import aboard, begin, sensed, tilt_deg
@@ -19,7 +20,7 @@ from scenarios.harness.metrics import survived, time_s
 from scenarios.harness.metrics.manoeuvres import inverted
 from scenarios.inverted import FIRST_S, LEGS
 from sim.log import Flight, Log, Phase
-from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, Motion, SteadyTurn, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, Motion, SteadyTurn
 
 FLOWN_S, SETTLED_S = 120.0, 20.0
 BANK_RAD = math.radians(20.0)
@@ -44,14 +45,14 @@ class OnItsBack:
         rate = upright.turn_rate_rad_s
         roll = self.bank_rad + math.pi
         omega_b = np.tile([0.0, rate * math.sin(roll), rate * math.cos(roll)], (len(t_s), 1))
-        R_eb = rotation_from_euler(roll, 0.0, rate * t_s)
+        R_eb = from_euler(roll, 0.0, rate * t_s)
         return Kinematics(R_eb, omega_b, path.p_e_m, path.v_e_m_s, path.a_e_m_s2)
 
 
 def _estimated(motion: Motion, roll_rad: float) -> tuple[Log, Array]:
     """What is sensed of a turn, and the attitudes estimated from wings level with a heading error of 40 degrees."""
     log = sensed(motion, FLOWN_S)
-    start = rotation_from_euler(np.array([roll_rad]), 0.0, OFF_RAD)[0]
+    start = from_euler(np.array([roll_rad]), 0.0, OFF_RAD)[0]
     return log, begin(Premerlani(aboard()), start).replay(log.measured)["R_eb"]
 
 

@@ -8,13 +8,14 @@ import numpy as np
 
 from estimator.interface import Array
 from estimator.premerlani import Premerlani
+from estimator.rotation import from_euler
 from scenarios.harness.claims.claim import Finding, Paper, claim, line
 from scenarios.harness.claims.flights import slowest
 from scenarios.harness.claims.motions import attitude_deg, begin, misread, printed, sensed
 from scenarios.harness.claims.picture import BLUE, ORANGE, RED, Panel
 from scenarios.harness.metrics import Series, settled_after_s
 from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, Kinematics, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class UpAndOn:
         along = np.stack([np.cos(pitch), zero, -np.sin(pitch)], axis=-1)
         across = np.stack([-np.sin(pitch), zero, -np.cos(pitch)], axis=-1)
         return Kinematics(
-            rotation_from_euler(0.0, pitch, zero),
+            from_euler(0.0, pitch, zero),
             np.stack([zero, rate, zero], axis=-1),
             np.stack([north, zero, -height], axis=-1),
             V * along,

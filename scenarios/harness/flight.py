@@ -1,54 +1,118 @@
-"""From a configuration to a flight: builds the aeroplane, its air, sensors, estimator and autopilot, and flies."""
+"""A flight, prepared once and flown: every command that flies goes through here.
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+`prepare` looks up and makes all that a flight needs, and refuses in one line what cannot be flown.  `Prepared.fly`
+flies it.  Nothing is looked up, resolved or constructed a second time on the way.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from estimator.instruments import Known, to_json
+from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import HeadingReference
-from scenarios.harness.aboard import flight_code, instruments_of, require_heard, with_calibration
-from scenarios.harness.config import (
-    BenchStart,
-    FlightConfig,
-    HandMotion,
-    HandThrowStart,
-    InFlightStart,
-    override,
-    resolve,
-)
-from scenarios.harness.config.air import build_air
+from scenarios.harness.aboard import equipped_estimator, instruments_of
+from scenarios.harness.config import FlightConfig, InFlightStart, fitted_suite, overridden, resolve
 from scenarios.harness.config.faults import parse_fault
-from scenarios.harness.fitted import suite_params
-from scenarios.harness.plugins import Maker, PluginError, heading_reference_of, learnt, maker_name
+from scenarios.harness.config.plant import build_plant
+from scenarios.harness.plugins import (
+    Equipped,
+    Maker,
+    PluginError,
+    equipped_autopilot,
+    heading_reference_of,
+    learnt,
+    maker_name,
+)
+from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario, ScriptFailed
-from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.clock import Rates
 from sim.events import events_of_faults
 from sim.log import Event, Flight, Log, Outcome
 from sim.loop import Watch, fly
-from sim.motion.prescribed_plant import PrescribedPlant, Rest
-from sim.plant import HandThrow, InFlight, Plant, Start
+from sim.params import near_misses
 from sim.power_up import sample_at_rest
 from sim.recording import plain
 from sim.sensors.faults import Fault
+from sim.sensors.fitting import SuiteParams
 from sim.sensors.suite import Suite
 
 
-def fly_scenario(
-    scenario: Scenario,
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """All that a flight needs, made once.  The plant is built when it is flown: JSBSim takes longest to load.
+
+    config          resolved: nothing is left to chance
+    suite           figures of its sensors              instruments     what is known of them aboard
+    estimator, autopilot    new, each with what it was given of `instruments`
+    script          the set-points, or the error of the scenario's function that should have made them
+    """
+
+    scenario: Scenario
+    config: FlightConfig
+    rates: Rates
+    suite: SuiteParams
+    instruments: Instruments
+    estimator: Equipped
+    autopilot: Equipped
+    heading_reference: HeadingReference
+    script: Any
+
+    @property
+    def unheard(self) -> list[str]:
+        """Properties of the instruments that are set and that neither estimator nor autopilot has a parameter for."""
+        return [name for name in self.config.instruments if name not in self.estimator.known | self.autopilot.known]
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """What goes into the recording, and from which the same flight can be prepared again."""
+        return {
+            "scenario": self.scenario.name,
+            "seed": self.config.seed,
+            "config": self.config.model_dump(mode="json"),
+            "known": to_json(self.instruments),
+        }
+
+    def fly(self, watch: Watch | None = None) -> Flight:
+        """Fly it; `watch` is called once a simulated second, see `sim.loop.fly`.
+
+        The manifest also holds ``on_ground``, the mean inertial sample from before a flight that starts in the air,
+        if there is one; ``known_to_estimator``, what the estimator was given of the instruments or has learnt; and
+        ``scenario_fault``, what went wrong in the scenario's own functions.
+        """
+        config, rates, manifest = self.config, self.rates, self.manifest
+        if isinstance(self.script, ScriptFailed):
+            return _unflown(str(self.script), rates, self.heading_reference, manifest)
+        plant, faults = build_plant(config, rates), [parse_fault(fault) for fault in config.faults]
+        airborne = isinstance(config.start, InFlightStart)
+        on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight) if airborne else None
+        flown = fly(
+            plant,
+            Suite(self.suite, rates, config.seed, config.flight, faults, plant.release_s),
+            self.estimator.code,
+            self.autopilot.code,
+            self.script,
+            Log.empty(rates.ticks(plant.release_s + config.duration_s)),
+            calibration_s=config.calibration_s,
+            on_ground=on_ground,
+            manifest=manifest | ({} if on_ground is None else {"on_ground": plain(on_ground._asdict())}),
+            watch=watch,
+        )
+        return _with_events(flown, self.scenario, faults, self.estimator)
+
+
+def prepare(
+    scenario: Scenario | str,
     overrides: Mapping[str, Any] | None = None,
     *,
     seed: int | None = None,
     flight: int | None = None,
     estimator: str | Maker | None = None,
-    watch: Watch | None = None,
     lenient: bool = False,
     kept: bool = False,
-) -> Flight:
-    """Fly `scenario` once.
+) -> Prepared:
+    """Prepare one flight of `scenario`, which may be named.
 
     Parameters
     ----------
@@ -56,14 +120,14 @@ def fly_scenario(
     seed, flight    name the random streams; None leaves those of the configuration
     estimator       name, ``module:Class``, ``file.py:Class``, a class, or a function that makes a new one for each
                     flight; it wins over the one of `overrides`, None is the scenario's own
-    watch           called once a simulated second, see `sim.loop.fly`
     lenient         accept a property of the instruments that is set and that no flight code has a parameter for
-    kept            of many flights: a script that raises for this one is its outcome, and no error
+    kept            one of many flights: a script that raises is the outcome of this one, not an error
 
     Raises
     ------
-    ValueError      one line: what is wrong with the configuration; nothing has been flown then
+    ValueError      one line: what is wrong, and what would be right
     """
+    scenario = find(scenario) if isinstance(scenario, str) else scenario
     changes: dict[str, Any] = {name: _of_python(value) for name, value in (overrides or {}).items()}
     for name, number in (("seed", seed), ("flight", flight)):
         if number is not None and str(changes.get(name, number)) != str(number):
@@ -73,12 +137,58 @@ def fly_scenario(
     maker = None if isinstance(estimator, str) else estimator
     if estimator is not None:
         changes["estimator"] = maker_name(estimator)
-    config = override(scenario.config, changes)
-    return fly_config(scenario, config, maker=maker, watch=watch, lenient=lenient, kept=kept)
+    config, suite = overridden(scenario.config, changes)
+    return _prepare(scenario, config, suite, maker, lenient, kept)
+
+
+def prepare_config(scenario: Scenario, config: FlightConfig, *, lenient: bool = False) -> Prepared:
+    """Prepare `scenario` under `config`; the ``config`` of a manifest prepares the same flight again."""
+    return _prepare(scenario, config, fitted_suite(config), None, lenient, False)
+
+
+def _prepare(
+    scenario: Scenario, config: FlightConfig, suite: SuiteParams, maker: Maker | None, lenient: bool, kept: bool
+) -> Prepared:
+    from scenarios.harness.commands.catalogue import aircraft  # reads the folder of aircraft
+
+    if config.aircraft not in aircraft():
+        raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
+    config = resolve(config, suite)
+    instruments = instruments_of(config, suite)
+    estimator, config = equipped_estimator(config, suite, instruments, maker)
+    reference = heading_reference_of(estimator.code)
+    autopilot = equipped_autopilot(config.autopilot, reference, config.aircraft, instruments)
+    try:
+        script: Any = scenario.scripted(config)
+    except ScriptFailed as problem:
+        if not kept:
+            raise
+        script = problem
+    prepared = Prepared(
+        scenario, config, config.rates.build(), suite, instruments, estimator, autopilot, reference, script
+    )
+    if not lenient and prepared.unheard:
+        name = prepared.unheard[0]
+        raise ValueError(
+            f"{name} = {config.instruments[name]!r}: neither estimator {config.estimator} nor autopilot "
+            f"{config.autopilot} has a parameter of that name"
+        )
+    return prepared
+
+
+def fly_scenario(scenario: Scenario, overrides: Mapping[str, Any] | None = None, **options: Any) -> Flight:
+    """Fly `scenario` once; `overrides` and `options` as for `prepare`, and ``watch`` as for `Prepared.fly`."""
+    watch = options.pop("watch", None)
+    return prepare(scenario, overrides, **options).fly(watch)
+
+
+def fly_config(scenario: Scenario, config: FlightConfig, *, lenient: bool = False) -> Flight:
+    """Fly `scenario` under `config`: ``fly_config(scenario, FlightConfig(**manifest["config"]))`` repeats a flight."""
+    return prepare_config(scenario, config, lenient=lenient).fly()
 
 
 def _of_python(value: Any) -> Any:
-    """`value` with Python's numbers in the place of NumPy's, as the manifest can hold them."""
+    """`value` with Python's numbers in place of NumPy's, as the manifest can hold them."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
@@ -88,73 +198,20 @@ def _of_python(value: Any) -> Any:
     return value
 
 
-def fly_config(
-    scenario: Scenario,
-    config: FlightConfig,
-    *,
-    maker: Maker | None = None,
-    watch: Watch | None = None,
-    lenient: bool = False,
-    kept: bool = False,
-) -> Flight:
-    """Fly `scenario` under `config`, drawing what it leaves to chance; `maker` makes the estimator where it is given.
-
-    The resolved configuration is the manifest's ``config``: ``fly_config(scenario, FlightConfig(**that))`` flies
-    the same flight again.  Its ``on_ground`` is the mean inertial sample from before a flight that starts in the air,
-    where there is one, its ``known`` what is known of the instruments, its ``known_to_estimator`` what of that
-    the estimator was given, or has learnt, its ``scenario_fault`` what went wrong in the scenario's own functions.
-    """
-    config = with_calibration(resolve(config), maker)
-    rates, faults = config.rates.build(), [parse_fault(fault) for fault in config.faults]
-    (estimator, known), (pilot, _) = code = flight_code(config, maker)
-    if not lenient:
-        require_heard(config, code)
-    manifest = {
-        "scenario": scenario.name,
-        "seed": config.seed,
-        "config": config.model_dump(mode="json"),
-        "known": to_json(instruments_of(config)),
-    }
-    try:
-        script = scenario.scripted(config)
-    except ScriptFailed as problem:
-        if not kept:
-            raise
-        return _unflown(str(problem), rates, heading_reference_of(estimator), manifest)
-    plant = plant_of(config, rates)
-    sensors = suite_params(config.suite, config.sensors, config.files)
-    airborne = isinstance(config.start, InFlightStart)
-    on_ground = sample_at_rest(sensors, rates, config.seed, config.flight) if airborne else None
-    flown = fly(
-        plant,
-        Suite(sensors, rates, config.seed, config.flight, faults, plant.release_s),
-        estimator,
-        pilot,
-        script,
-        Log.empty(rates.ticks(plant.release_s + config.duration_s)),
-        calibration_s=config.calibration_s,
-        on_ground=on_ground,
-        manifest=manifest | ({} if on_ground is None else {"on_ground": plain(on_ground._asdict())}),
-        watch=watch,
-    )
-    return _told(flown, scenario, faults, estimator, known)
-
-
 def _unflown(why: str, rates: Rates, reference: HeadingReference, manifest: dict[str, Any]) -> Flight:
-    """A flight that did not begin, for its script raised."""
+    """A flight that did not begin because its script raised."""
     events = (Event(0.0, why, "error"),)
     return Flight(Log.empty(0), rates.dt_s, 0.0, Outcome.SCENARIO_FAILED, reference, why, events, manifest)
 
 
-def _told(
-    flown: Flight, scenario: Scenario, faults: Sequence[Fault], estimator: object, known: Mapping[str, Known]
-) -> Flight:
+def _with_events(flown: Flight, scenario: Scenario, faults: list[Fault], estimator: Equipped) -> Flight:
     """`flown` with its events, and what the estimator learnt; whatever is wrong with these, the flight is kept."""
     milestones, fault = scenario.events(flown)
     events, manifest = (*flown.events, *events_of_faults(faults, flown), *milestones), dict(flown.manifest)
     outcome, message = flown.outcome, flown.message
+    known: Mapping[str, Known] = estimator.known
     try:
-        known = learnt(estimator, known)
+        known = learnt(estimator.code, known)
     except PluginError as problem:
         if outcome in (Outcome.COMPLETED, Outcome.GROUND_CONTACT, Outcome.LEFT_BOX):
             outcome, message = Outcome.ESTIMATOR_FAILED, str(problem)
@@ -170,51 +227,3 @@ def _told(
 
 def _last_s(flight: Flight) -> float:
     return float(flight.log.truth["t_s"][-1]) if len(flight.log) else 0.0
-
-
-def plant_of(config: FlightConfig, rates: Rates) -> Plant:
-    """What flies under a resolved configuration: the aeroplane in its air, or what lies on a table."""
-    start = config.start
-    if isinstance(start, BenchStart):
-        roll_rad, pitch_rad, heading_rad = _radians((start.roll_deg, start.pitch_deg, config.heading_deg))
-        rest = Rest(roll_rad, pitch_rad, heading_rad, start.height_m)
-        return PrescribedPlant(rest, rates, release_s=start.calibration_s)
-    return JsbsimPlant(
-        config.aircraft,
-        start=start_of(config),
-        air=build_air(config.air),
-        rates=rates,
-        seed=config.seed,
-        flight=config.flight,
-        box=FlightBox(config.box_radius_m, config.box_height_m),
-    )
-
-
-def start_of(config: FlightConfig) -> Start:
-    """Start of the aeroplane of a resolved configuration."""
-    start, heading_rad = config.start, math.radians(config.heading_deg)
-    if isinstance(start, BenchStart):
-        raise ValueError("start: on a table nothing starts to fly")
-    if not isinstance(start, HandThrowStart):
-        north_m, east_m = start.out_m * math.cos(heading_rad), start.out_m * math.sin(heading_rad)
-        return InFlight(heading_rad, start.height_m, north_m, east_m, start.airspeed_m_s)
-    hand = start.hand
-    if not isinstance(hand, HandMotion):
-        raise ValueError(f"start.hand = {hand!r}: resolve the configuration first")
-    return HandThrow(
-        heading_rad,
-        math.radians(start.pitch_deg),
-        _radians(hand.sway_deg_s),
-        hand.sway_hz,
-        _radians(hand.sway_phase_deg),
-        _radians(hand.release_rate_deg_s),
-        start.height_m,
-        start.hold_s,
-        start.push_m_s2,
-        start.push_s,
-    )
-
-
-def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = (math.radians(d) for d in degrees)
-    return x, y, z

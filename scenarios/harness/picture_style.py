@@ -1,10 +1,9 @@
-"""Colours and style of all pictures, for `matplotlib.rc_context`."""
+"""What all pictures share: palette, style of Matplotlib, resolution."""
 
 from typing import Any
 
 INK, FAINT, GRID = "#1f2933", "#7b8794", "#e4e7eb"
 BLUE, ORANGE, GREEN, RED, VIOLET, TEAL = "#2563a8", "#d9730d", "#3a8f4d", "#c0392b", "#7d52a0", "#16858c"
-DPI = 150
 STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 9.0,
@@ -28,3 +27,4 @@ STYLE: dict[Any, Any] = {
     "legend.fontsize": 8.0,
     "lines.linewidth": 1.8,
 }
+DPI = 150

@@ -1,6 +1,7 @@
 """The verdict: every check of every flight, the same pooled over the flights, and the exit code."""
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -25,6 +26,7 @@ class FlightVerdict:
     """One flight judged: which it was, how it ended, its lines, and the numbers reported beside them.
 
     rows : none where nothing of it was recorded: its process died, or was stopped
+    metrics : numbers by name, see `metrics_of`; empty where there are no rows
     known : what the estimator was given of the instruments, or has learnt, by name
     wall_s : how long it took; None where nobody looked.  It is no part of the result
     """
@@ -34,7 +36,7 @@ class FlightVerdict:
     seed: int
     outcome: Outcome
     rows: tuple[Row, ...]
-    metrics: dict[str, Any]
+    metrics: Mapping[str, float | None]
     message: str = ""
     flight: int = 0
     known: Mapping[str, Known] = field(default_factory=dict)
@@ -77,13 +79,38 @@ def judge(scenario: Scenario, flight: Flight) -> FlightVerdict:
     config = flight.manifest["config"]
     known = {name: Known.from_json(entry) for name, entry in flight.manifest.get("known_to_estimator", {}).items()}
     rows = tuple(check.judge(flight) for check in scenario.checks)
+    metrics = metrics_of(flight, rows)
     message = flight.message or next((f"check {row.name!r}: {row.note}" for row in rows if row.raised), "")
     if fault := flight.manifest.get("scenario_fault"):
         rows += (Row("milestones", "", math.nan, ">=", 1.0, False, fault, raised=True),)
     return FlightVerdict(
-        scenario.name, config["estimator"], config["seed"], flight.outcome, rows, summary(flight), message,
+        scenario.name, config["estimator"], config["seed"], flight.outcome, rows, metrics, message,
         config["flight"], known,
     )  # fmt: skip
+
+
+def metrics_of(flight: Flight, rows: Iterable[Row] = ()) -> dict[str, float | None]:
+    """The numbers of one flight by name, each name with its unit; None if it could not be measured.
+
+    First the general ones, which have the same names and meaning in every scenario (see `metrics.summary`); then the
+    measured value of each check of `rows`, under the name that `metric_name` makes of it.
+    """
+    named: dict[str, float | None] = dict(summary(flight))
+    for row in rows:
+        name, n = metric_name(row.name, row.unit), 1
+        while (key := name if n == 1 else f"{name}_{n}") in named:
+            n += 1
+        named[key] = row.measured if math.isfinite(row.measured) else None
+    return named
+
+
+def metric_name(check: str, unit: str) -> str:
+    """The name of a check's value among the metrics: "heading error RMS", "deg" is ``heading_error_rms_deg``.
+
+    Lower-case letters of ASCII, digits and underscores.
+    """
+    words = re.findall(r"[a-z0-9]+", f"{check} {unit}".lower())
+    return "_".join(words) or "check"
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +161,7 @@ class Verdict:
                 {
                     "scenario": v.scenario, "estimator": v.estimator, "seed": v.seed, "flight": v.flight,
                     "outcome": str(v.outcome), "message": v.message, "passed": v.passed,
-                    "checks": [plain(row) for row in v.rows], "metrics": v.metrics,
+                    "checks": [plain(row) for row in v.rows], "metrics": dict(v.metrics),
                     "known": to_json(v.known),
                 }
                 for v in self.flights

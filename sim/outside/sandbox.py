@@ -76,7 +76,7 @@ class _Child:
     def __init__(self) -> None:
         self.of = os.getpid()
         start = (
-            f"import sys; sys.path[:] = {sys.path!r}; from sim import sandbox; "
+            f"import sys; sys.path[:] = {sys.path!r}; from sim.outside import sandbox; "
             f"sandbox.serve({os.getpid()})"
         )  # fmt: skip
         self.process = subprocess.Popen(

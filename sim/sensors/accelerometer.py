@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams, warming
 from sim.sensors.device import carry, distort, filter_noise, on_supply, quantise, shake, step_filter
 from sim.sensors.noise import (
     FLICKER_TIMES_S,
-    STANDARD_GRAVITY_M_S2,
     Output,
     Source,
     flicker,
@@ -92,7 +92,7 @@ NOISE = (("force_bias_b_m_s2", "f8", (3,)), ("force_noise_b_m_s2", "f8", (3,)))
 
 def make(params: AccelerometerParams, board: BoardParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
     """Make one accelerometer: draw the errors that stay for life into `unit`, shape (1,) of UNIT."""
-    g = STANDARD_GRAVITY_M_S2
+    g = G_M_S2
     device.make(
         params, board, rates, source, unit, name="accelerometer",
         full_scale=params.range_g * g, step=params.step_g * g, null=params.null_g * g,
@@ -119,10 +119,10 @@ def draw(
     if params.walk_ug_sqrt_s:
         steps = source("accelerometer walk").standard_normal((n, 3))
         bias_g = bias_g + random_walk(steps, 1e-6 * params.walk_ug_sqrt_s, dt_s)
-    noise["force_bias_b_m_s2"] = bias_g * STANDARD_GRAVITY_M_S2
+    noise["force_bias_b_m_s2"] = bias_g * G_M_S2
     noise["force_noise_b_m_s2"] = 0.0
     if params.noise_density_ug_sqrt_hz:
-        sigma_m_s2 = sample_sigma(1e-6 * params.noise_density_ug_sqrt_hz, rates.imu_hz) * STANDARD_GRAVITY_M_S2
+        sigma_m_s2 = sample_sigma(1e-6 * params.noise_density_ug_sqrt_hz, rates.imu_hz) * G_M_S2
         noise["force_noise_b_m_s2"] = sigma_m_s2 * source("accelerometer noise").standard_normal((n, 3))
 
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams, warming
 from sim.sensors.device import carry, distort, filter_noise, on_supply, quantise, rate_shape, shake, step_filter
 from sim.sensors.noise import (
     FLICKER_TIMES_S,
-    STANDARD_GRAVITY_M_S2,
     Output,
     Source,
     flicker,
@@ -106,7 +106,7 @@ def make(params: GyroParams, board: BoardParams, rates: Rates, source: Source, u
         density_sqrt_hz=math.radians(params.noise_density_deg_s_sqrt_hz),
     )  # fmt: skip
     if params.g_sensitivity_deg_s_g:
-        sigma = math.radians(params.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2
+        sigma = math.radians(params.g_sensitivity_deg_s_g) / G_M_S2
         G = sigma * source("gyro g-sensitivity").standard_normal((3, 3))
         unit["leans"], unit["g_sensitivity"] = 1, G @ device.axes(board.mounting_deg)
         unit["off_centre"] = any(board.lever_arm_b_m)

@@ -22,7 +22,6 @@ import numpy as np
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 
-STANDARD_GRAVITY_M_S2: Final = 9.80665  # what a data sheet means by 1 g
 MOST_BITS: Final = 24
 MOST_CONVERSIONS: Final = 1000
 

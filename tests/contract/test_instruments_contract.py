@@ -10,12 +10,10 @@ from autopilot.airframes import AutopilotParams
 from autopilot.dcm import DcmAutopilot
 from estimator import ESTIMATORS
 from estimator.instruments import BOOLEAN, PROPERTIES, Instruments, Known
-from scenarios.harness.aboard import instruments_of
 from scenarios.harness.commands import compare
-from scenarios.harness.config import override, resolve
-from scenarios.harness.flight import fly_scenario
+from scenarios.harness.config import override
+from scenarios.harness.flight import fly_scenario, prepare, prepare_config
 from scenarios.harness.plugins import equipped, equipped_autopilot, shared_settings
-from scenarios.harness.preflight import prepared
 from scenarios.harness.registry import find
 from sim.params import dotted_fields
 from sim.sensors.fitting import SUITES
@@ -25,7 +23,7 @@ TURNS = find("turns_180")
 
 def aboard(suite, **changes):
     """The record of a flight with that suite."""
-    return instruments_of(resolve(override(TURNS.config, {"suite": suite, **changes})))
+    return prepare_config(TURNS, override(TURNS.config, {"suite": suite, **changes}), lenient=True).instruments
 
 
 def own_parameters(estimator):
@@ -171,8 +169,8 @@ def test_flight_from_python_knows_its_instruments_and_keeps_them():
 def test_property_that_is_set_and_that_nobody_takes_is_refused(estimator, setting):
     """Before anything is flown: a setting is never accepted and then ignored.  One that the autopilot takes is fine."""
     with pytest.raises(ValueError, match=f"{setting} = 0.5: neither estimator {estimator} nor autopilot dcm has"):
-        prepared("turns_180", {"estimator": estimator, setting: 0.5})
-    _, config = prepared("turns_180", {"estimator": estimator, "gps_filter_s": 0.5})
+        prepare(TURNS, {"estimator": estimator, setting: 0.5})
+    config = prepare(TURNS, {"estimator": estimator, "gps_filter_s": 0.5}).config
     assert config.instruments == {"gps_filter_s": 0.5}
 
 
@@ -180,7 +178,7 @@ def test_property_set_for_a_comparison_goes_to_those_that_have_it_and_a_note_lis
     """And is refused where none has it."""
     plan = compare.prepare("turns_180", ["premerlani", "gyro_only"], [0], {"gps_latency_s": 0.6})
     assert plan.notes == ("gps_latency_s is set for premerlani; without that parameter: gyro_only",)
-    with pytest.raises(ValueError, match=r"gps_latency_s = 0\.6: none of them has such a parameter"):
+    with pytest.raises(ValueError, match=r"gps_latency_s = 0\.6: no estimator has a parameter of that name"):
         compare.prepare("turns_180", ["gyro_only"], [0], {"gps_latency_s": 0.6})
 
 

@@ -8,12 +8,13 @@ import pytest
 from estimator.blocks.magnetometer import Calibration
 from estimator.gps_velocity import GpsVelocityMagnetometer, GpsVelocityParams
 from estimator.interface import MEASURED_DTYPE
-from estimator.rotation import heading_rad
-from scenarios.harness.aboard import instruments_of, with_calibration
-from scenarios.harness.config import FlightConfig, override, resolve
+from estimator.rotation import from_euler, heading_rad
+from scenarios.harness.config import FlightConfig, override
+from scenarios.harness.flight import prepare_config
+from scenarios.harness.registry import find
 from sim import place
 from sim.magnetic_field import field_e_ut
-from sim.motion.prescribed_plant import GRAVITY_M_S2, rotation_from_euler
+from sim.motion.prescribed_plant import GRAVITY_M_S2
 
 FIELD = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, place.YEAR)
 HARD_IRON = (6.0, -10.0, 8.0)
@@ -23,29 +24,30 @@ CLEAN = {
 }
 
 
-def config_of(**changes):
-    """A resolved configuration of a flight with apm2."""
+def prepared(**changes):
+    """A flight with apm2, prepared."""
     data = {"suite": "apm2", "estimator": "gps_velocity_magnetometer", "turn_table": True, **changes}
-    return resolve(FlightConfig(**data))
+    scenario = find("crosswind")
+    return prepare_config(scenario, scenario.config.model_copy(update=data))
 
 
 def test_turned_on_the_table_the_hard_iron_is_found_and_nothing_else():
     """No other error than counts of 0.077 uT, and the sweep's steps of 4 degrees at most: 54 (1 - cos 4) = 0.13 uT."""
-    told = with_calibration(config_of(sensors=CLEAN)).estimator_params
+    told = prepared(sensors=CLEAN).config.estimator_params
     np.testing.assert_allclose(told["calibration.hard_iron_b_ut"], HARD_IRON, rtol=0, atol=0.15)
     np.testing.assert_allclose(told["calibration.soft_iron"], np.eye(3), rtol=0, atol=0.01)
 
 
 def test_turned_on_the_table_it_is_the_magnetometer_of_the_flight():
     """What is found differs by seed, as the irons do; and takes the flight's own readings to the earth's field."""
-    first, second = (with_calibration(config_of(seed=seed)).estimator_params for seed in (0, 1))
+    first, second = (prepared(seed=seed).config.estimator_params for seed in (0, 1))
     assert first["calibration.hard_iron_b_ut"] != second["calibration.hard_iron_b_ut"]
 
 
 @pytest.mark.parametrize("turned", [True, False])
 def test_declination_is_known_with_or_without_turning(turned):
     """13 degrees west at the launch point, from the world magnetic model; a turn makes the magnetometer usable."""
-    aboard = instruments_of(config_of(turn_table=turned))
+    aboard = prepared(turn_table=turned).instruments
     assert aboard.value("declination_rad") == math.atan2(FIELD[1], FIELD[0])
     assert (aboard.value("use_magnetometer"), aboard.value("magnetometer_calibrated")) == (True, turned)
 
@@ -53,15 +55,15 @@ def test_declination_is_known_with_or_without_turning(turned):
 def test_calibration_by_hand_is_kept():
     """Numbers that somebody typed are not measured anew."""
     by_hand = {"declination_rad": 0.1, "calibration.hard_iron_b_ut": (1.0, 2.0, 3.0)}
-    assert with_calibration(config_of(estimator_params=by_hand)).estimator_params == by_hand
+    assert prepared(estimator_params=by_hand).config.estimator_params == by_hand
 
 
 @pytest.mark.parametrize(("suite", "estimator"), [("apm2", "premerlani"), ("apm2", "oracle"), ("generic", "dilshad")])
 def test_nothing_is_calibrated_where_nobody_has_a_calibration(suite, estimator):
     """An estimator that takes no magnetometer, one without parameters, and sensors without a magnetometer."""
-    config = config_of(suite=suite, estimator=estimator, turn_table=suite == "apm2")
-    assert with_calibration(config).estimator_params == {}
-    assert (instruments_of(config).value("declination_rad") is None) is (suite == "generic")
+    found = prepared(suite=suite, estimator=estimator, turn_table=suite == "apm2")
+    assert found.config.estimator_params == {}
+    assert (found.instruments.value("declination_rad") is None) is (suite == "generic")
 
 
 def test_turning_a_magnetometer_that_is_not_fitted_is_refused():
@@ -72,7 +74,7 @@ def test_turning_a_magnetometer_that_is_not_fitted_is_refused():
 
 def estimated_heading_error(heading, hard_iron_b_ut, **params):
     """Heading error [rad] of `gps_velocity_magnetometer` after 400 s level at rest under a field with hard iron."""
-    R = rotation_from_euler(0.0, 0.0, np.array([heading]))[0]
+    R = from_euler(0.0, 0.0, np.array([heading]))[0]
     rows = np.zeros(20_000, MEASURED_DTYPE)
     rows["t_s"], rows["dt_s"] = 0.02 * np.arange(1, 20_001), 0.02
     rows["force_b_m_s2"] = (0.0, 0.0, -GRAVITY_M_S2)

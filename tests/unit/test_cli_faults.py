@@ -115,7 +115,7 @@ def test_check_flies_every_seed_with_the_faults(here, monkeypatch):
     hand_launch = find("hand_launch")
     short = replace(hand_launch, config=hand_launch.config.model_copy(update={"duration_s": 4.0}))
     monkeypatch.setattr(gate, "find", lambda _: short)
-    monkeypatch.setattr("scenarios.harness.preflight.find", lambda _: short)
+    monkeypatch.setattr("scenarios.harness.flight.find", lambda _: short)
     arguments = ["check", "hand_launch", "--seeds", "0", "--workers", "1", "--json", "verdict.json"]
     assert run([*arguments, "--fault", "gyro:saturated@0.5"]) == 1
     assert not json.loads((here / "verdict.json").read_text())["passed"]
@@ -124,5 +124,5 @@ def test_check_flies_every_seed_with_the_faults(here, monkeypatch):
 def test_fault_that_the_flight_is_too_short_for_is_warned_of(here, capsys):
     """It is flown, and a line on standard error says that the fault was never met."""
     assert run([*SHORT, "--fault", "gyro.x:stuck@20-25"]) in (0, 1)
-    assert "warning: fault gyro.x:stuck@20-25 is never met" in capsys.readouterr().err
+    assert "warning: fault gyro.x:stuck@20-25 never happens" in capsys.readouterr().err
     assert not any("stuck" in event.text for event in recorded(here).events)

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from scenarios.harness.aboard import instruments_of
 from scenarios.harness.config import (
     AirConfig,
     FlightConfig,
@@ -18,10 +17,12 @@ from scenarios.harness.config import (
     resolve,
 )
 from scenarios.harness.config.air import Wind, parse_wind
-from scenarios.harness.fitted import suite_params
+from scenarios.harness.flight import prepare_config
 from scenarios.harness.plugins import equipped
+from scenarios.harness.registry import find
 from sim.clock import Rates
 from sim.params import changed
+from sim.sensors.fitting import suite_params
 from sim.sensors.suite import SUITES
 
 THROW = FlightConfig(start=HandThrowStart(), air=AirConfig(wind_m_s=2.0, wind_from_deg="random"))
@@ -228,9 +229,14 @@ def test_heading_before_it_is_drawn_is_refused():
         _ = FlightConfig(start=InFlightStart()).heading_deg
 
 
+def aboard(config):
+    """What is known of the instruments under `config`."""
+    return prepare_config(find("crosswind"), config, lenient=True).instruments
+
+
 def given(config, estimator, **settings):
     """The estimator of that name as it flies under `config`."""
-    return equipped(estimator, instruments_of(resolve(config)), settings)
+    return equipped(estimator, aboard(config), settings)
 
 
 @pytest.mark.parametrize("name", ["instruments.gps_latency_s", "gps_latency_s"])
@@ -266,5 +272,5 @@ def test_property_that_is_withheld_is_assumed_and_says_so():
     """Nobody is told the 12 s of this receiver; what is set wins over what is withheld."""
     config = override(CROSS, {"gps.latency_s": 12.0, "withheld": "gps_latency_s"})
     assert given(config, "premerlani").known["gps_latency_s"] == (0.3, "withheld", "")
-    assert instruments_of(resolve(override(config, {"withheld": ""})))["gps_latency_s"].value == 12.0
-    assert instruments_of(resolve(override(config, {"gps_latency_s": 1})))["gps_latency_s"].source == "set"
+    assert aboard(override(config, {"withheld": ""}))["gps_latency_s"].value == 12.0
+    assert aboard(override(config, {"gps_latency_s": 1}))["gps_latency_s"].source == "set"

@@ -6,9 +6,9 @@ import re
 import pytest
 
 from scenarios.harness.config import FlightConfig, override, resolve
-from scenarios.harness.fitted import suite_params
 from scenarios.harness.flight import fly_config
 from scenarios.harness.registry import find
+from sim.sensors.fitting import suite_params
 
 CONFIG = FlightConfig()
 MINE = """

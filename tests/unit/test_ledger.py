@@ -9,9 +9,9 @@ import pytest
 from estimator.instruments import Known
 from scenarios.harness.checks import Row
 from scenarios.harness.cli.app import run
+from scenarios.harness.flight import prepare
 from scenarios.harness.gate import sources
 from scenarios.harness.gate.ledger import Ledger
-from scenarios.harness.preflight import prepared
 from scenarios.harness.verdict import FlightVerdict
 from sim.log import Outcome
 
@@ -80,8 +80,8 @@ def fingerprint(spec: str, **changes) -> str:
     """Of a flight of the estimator."""
     for cached in (sources._of_file, sources._of_modules):
         cached.cache_clear()  # of another run
-    _, config = prepared("crosswind", {"estimator": spec, **changes})
-    return sources.fingerprint(sources.decided_by("crosswind", config))
+    prepared = prepare("crosswind", {"estimator": spec, **changes})
+    return sources.fingerprint(sources.decided_by("crosswind", prepared))
 
 
 def test_fingerprint_changes_with_everything_that_decides_a_flight(tmp_path: Path, monkeypatch) -> None:

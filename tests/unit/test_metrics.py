@@ -359,11 +359,22 @@ def test_survived_is_only_a_flight_that_was_completed(outcome):
 
 
 def test_summary_is_plain_and_finite_or_none():
-    """The numbers told of a flight carry their units and can be written as JSON, even of a flight without a tick."""
+    """The metrics of a flight carry their units and can be written as JSON, even of a flight without a tick."""
     whole = summary(made_up(20.0))
     assert whole["inclination_rms_deg"] == 0.0
     assert whole["wind_error_rms_m_s"] is None
+    assert whole["height_min_m"] == 50.0
     assert whole["flown_s"] == pytest.approx(20.0, rel=0, abs=1e-6)
     nothing = summary(Flight(Log.empty(0), DT_S, 0.0, Outcome.DIVERGED, "course"))
     assert set(nothing) == set(whole)
     assert all(value is None for value in nothing.values())
+
+
+@pytest.mark.parametrize(("reference", "off_deg"), [("course", 12.0), ("nose", 22.0)])
+def test_summary_heading_is_against_what_the_estimator_names(reference, off_deg):
+    """North over the ground, nose at 350 degrees, estimate at 12: one of the two errors, by the estimator's word."""
+    flight = made_up(1.0, reference=reference)
+    flight.log.truth["R_eb"], flight.log.flown["R_eb"] = attitudes(350.0), attitudes(12.0)
+    numbers = summary(flight)
+    assert numbers["heading_rms_deg"] == pytest.approx(off_deg, rel=0, abs=ROUND_OFF_DEG)
+    assert numbers[f"heading_against_{reference}_rms_deg"] == numbers["heading_rms_deg"]

@@ -11,9 +11,9 @@ from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Script, Timed
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import FlightConfig
-from scenarios.harness.metrics import Measured
+from scenarios.harness.metrics import Measured, summary
 from scenarios.harness.scenario import Scenario
-from scenarios.harness.verdict import FlightVerdict, Verdict, judge
+from scenarios.harness.verdict import FlightVerdict, Verdict, judge, metric_name, metrics_of
 from sim.log import Flight, Log, Outcome, Phase
 
 
@@ -134,6 +134,41 @@ def test_markdown_shows_failed_flights_with_their_numbers():
     assert "| tilt RMS | 7 deg | <= 6 deg | **FAIL** |" in text
     assert "### seed 1 flight 0: ground_contact" in text
     assert "### seed 0" not in text
+
+
+def test_json_metrics_are_the_general_ones_and_the_value_of_each_check():
+    """The same names in the verdict and in its JSON; the value of a check is the one that was judged."""
+    flight = flown(3.0)
+    verdict = verdict_of(flight)
+    metrics = json.loads(verdict.to_json_text())["flights"][0]["metrics"]
+    assert metrics == summary(flight) | {"survived": 1.0, "tilt_rms_deg": 3.0} == verdict.flights[0].metrics
+    assert verdict_of(flown(math.nan)).flights[0].metrics["tilt_rms_deg"] is None
+
+
+@pytest.mark.parametrize(
+    ("check", "unit", "name"),
+    [
+        ("heading error RMS", "deg", "heading_error_rms_deg"),
+        ("inclination error RMS, learnt", "deg", "inclination_error_rms_learnt_deg"),
+        ("offset not learnt", "deg/s", "offset_not_learnt_deg_s"),
+        ("survived", "", "survived"),
+        ("Überflug (2.5 m)", "m", "berflug_2_5_m_m"),
+        ("\ud800\n", "°", "check"),
+    ],
+)
+def test_metric_name_is_snake_case_with_the_unit(check, unit, name):
+    """Whatever the check is called: lower-case ASCII letters, digits and underscores."""
+    assert metric_name(check, unit) == name
+
+
+def test_metrics_of_checks_with_names_that_are_taken_are_numbered():
+    """A check never hides a general metric, nor another check."""
+    flight = flown(1.0)
+    limits = {"inclination RMS": 5.0, "tilt: RMS": 6.0, "tilt, RMS": 7.0}
+    rows = [Check(name, "deg", lambda _f, v=v: Measured(v), 9.0).judge(flight) for name, v in limits.items()]
+    metrics = metrics_of(flight, rows)
+    assert summary(flight).items() <= metrics.items()
+    assert (metrics["inclination_rms_deg_2"], metrics["tilt_rms_deg"], metrics["tilt_rms_deg_2"]) == (5.0, 6.0, 7.0)
 
 
 def died(seed, estimator="premerlani"):

@@ -12,20 +12,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot.interface import NEUTRAL
 from estimator.blocks.magnetometer import Calibration
-from estimator.blocks.screening import G_M_S2
-from estimator.interface import Array, ImuSample
+from estimator.interface import G_M_S2, Array, ImuSample
 from estimator.premerlani import PremerlaniParams
 from estimator.rotation import inclination_error_rad, rotation_error_rad
-from scenarios.harness.fitted import suite_params
 from sim import place
 from sim.clock import Rates
 from sim.log import Log
+from sim.loop import sense
 from sim.magnetic_field import field_e_ut
 from sim.motion.prescribed_plant import Motion, PrescribedPlant
 from sim.motion.turn_table import TurnTable
 from sim.power_up import sample_at_rest
+from sim.sensors.fitting import suite_params
 from sim.sensors.suite import Suite
 
 IMU_HZ = 50
@@ -94,12 +93,7 @@ def _seen(
     params = suite_params(suite, dict(changes))
     rates = rates or Rates(imu_hz=IMU_HZ, gps_hz=params.gps.rate_hz)
     log = Log.empty(rates.ticks(duration_s))
-    plant, sensors = PrescribedPlant(motion, rates), Suite(params, rates, seed)
-    plant.reset(log)
-    sensors.reset(log)
-    for k in range(len(log)):
-        plant.advance(k, NEUTRAL)
-        sensors.measure(k)
+    sense(PrescribedPlant(motion, rates), Suite(params, rates, seed), log)
     log.truth.flags.writeable = log.measured.flags.writeable = False
     return log
 

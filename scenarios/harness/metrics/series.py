@@ -12,7 +12,7 @@ still, and is judged where ``|r_zx| < 0.9`` and the ground speed is above 3 m/s;
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -350,21 +350,26 @@ def time_in_mode_s(mode: Mode) -> Metric:
     return lambda flight: Measured(flight.dt_s * int(np.sum((flight.log.flown["mode"] == mode) & (time_s(flight) > 0))))
 
 
-def summary(flight: Flight) -> dict[str, Any]:
-    """Numbers that are told of every flight, named with their units; None where there is nothing to measure."""
+def summary(flight: Flight) -> dict[str, float | None]:
+    """Metrics of any flight, over all of it from the release on, with units in their names; None: not measurable.
+
+    ``heading_rms_deg`` is against what the flight's estimator says its heading converges to, the nose or the course.
+    """
     incline, geodesic = inclination_error_deg(flight), attitude_error_deg(flight)
     course, nose = heading_error_deg("course")(flight), heading_error_deg("nose")(flight)
+    heading = course if flight.heading_reference == "course" else nose
     numbers = {
         "inclination_rms_deg": rms(incline.judged_values),
         "inclination_p95_deg": p95(incline.judged_values),
         "inclination_max_deg": highest(incline.judged_values),
-        "attitude_rms_deg": rms(geodesic.judged_values),
+        "heading_rms_deg": rms(heading.judged_values),
         "heading_against_course_rms_deg": rms(course.judged_values),
         "heading_against_nose_rms_deg": rms(nose.judged_values),
+        "attitude_rms_deg": rms(geodesic.judged_values),
         "gyro_bias_error_rms_deg_s": rms(gyro_bias_error_deg_s(flight).judged_values),
         "wind_error_rms_m_s": rms(wind_error_m_s(flight).judged_values) if len(flight.log) else math.nan,
         "orthogonality_max": highest(orthogonality_error(flight).judged_values),
-        "lowest_height_m": lowest(height_m(flight).judged_values),
+        "height_min_m": lowest(height_m(flight).judged_values),
         "flown_s": float(time_s(flight)[-1]) if len(flight.log) else math.nan,
     }
     return {name: value if math.isfinite(value) else None for name, value in numbers.items()}

@@ -1,0 +1,58 @@
+"""The plant of a configuration: the aeroplane in its air, or the instruments on a table."""
+
+import math
+
+from scenarios.harness.config.air import build_air
+from scenarios.harness.config.flight import BenchStart, FlightConfig, HandMotion, HandThrowStart
+from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
+from sim.clock import Rates
+from sim.motion.prescribed_plant import PrescribedPlant, Rest
+from sim.plant import HandThrow, InFlight, Plant, Start
+
+
+def build_plant(config: FlightConfig, rates: Rates) -> Plant:
+    """The plant of a resolved configuration."""
+    start = config.start
+    if isinstance(start, BenchStart):
+        roll_rad, pitch_rad, heading_rad = _radians((start.roll_deg, start.pitch_deg, config.heading_deg))
+        rest = Rest(roll_rad, pitch_rad, heading_rad, start.height_m)
+        return PrescribedPlant(rest, rates, release_s=start.calibration_s)
+    return JsbsimPlant(
+        config.aircraft,
+        start=build_start(config),
+        air=build_air(config.air),
+        rates=rates,
+        seed=config.seed,
+        flight=config.flight,
+        box=FlightBox(config.box_radius_m, config.box_height_m),
+    )
+
+
+def build_start(config: FlightConfig) -> Start:
+    """Start of the aeroplane of a resolved configuration; ValueError if it never flies, or is not resolved."""
+    start, heading_rad = config.start, math.radians(config.heading_deg)
+    if isinstance(start, BenchStart):
+        raise ValueError("start: a flight on a table has no start in the air")
+    if not isinstance(start, HandThrowStart):
+        north_m, east_m = start.out_m * math.cos(heading_rad), start.out_m * math.sin(heading_rad)
+        return InFlight(heading_rad, start.height_m, north_m, east_m, start.airspeed_m_s)
+    hand = start.hand
+    if not isinstance(hand, HandMotion):
+        raise ValueError(f"start.hand = {hand!r}: resolve the configuration first")
+    return HandThrow(
+        heading_rad,
+        math.radians(start.pitch_deg),
+        _radians(hand.sway_deg_s),
+        hand.sway_hz,
+        _radians(hand.sway_phase_deg),
+        _radians(hand.release_rate_deg_s),
+        start.height_m,
+        start.hold_s,
+        start.push_m_s2,
+        start.push_s,
+    )
+
+
+def _radians(degrees: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (math.radians(d) for d in degrees)
+    return x, y, z
