@@ -58,7 +58,8 @@ def gps_filter_settles() -> Finding:
     new = log.measured["gps_new"] == 1
     at_three = float(np.interp(3.0, after_s, response))
 
-    x, shown = "s after the step", {"xlim": (-1.0, 6.0), "xticks": range(-1, 7)}
+    x = "s after the step"
+    shown: dict[str, Any] = {"xlim": (-1.0, 6.0), "xticks": range(-1, 7)}
     step = Panel("A step of velocity, inside the receiver", "part of the step", x, **shown)
     step.curve(after_s, np.where(after_s > 0.0, 1.0, 0.0), FAINT, lw=1)
     step.curve(after_s, response, BLUE)

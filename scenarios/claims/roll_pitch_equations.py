@@ -123,7 +123,7 @@ def _errors_deg(seeds: Sequence[int], suite: str, hz: int) -> tuple[float, float
     """Inclination error RMS in two turns in turbulence, summed between reports and sampled at the report."""
     changes = {
         "suite": suite, "rates.gps_hz": hz, "sensors.gps.filter_s": 0.0, "sensors.gps.latency_s": 0.0,
-        "duration_s": 80.0,
+        "duration_s": 80.0
     }  # fmt: skip
     logs = [flight.log for flight in flights("turns_180", seeds, changes, "sim.oracle:Oracle")]
 

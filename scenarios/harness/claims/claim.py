@@ -12,7 +12,7 @@ holds the title and the claim in our own words, and it returns what was measured
         error = pooled_rms(flights("circle", seeds), inclination_error_deg, from_s=20.0)
         return Finding(
             [line("inclination error in a turn", "deg RMS", error, "<=", 5.0)],
-            f"In a steady turn the inclination error is {error:.1f} degrees RMS.",
+            f"In a steady turn the inclination error is {error:.1f} degrees RMS."
         )
 
 The lines alone decide the verdict:

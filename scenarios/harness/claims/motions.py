@@ -83,12 +83,7 @@ def sensed(
 
 @lru_cache(maxsize=8)  # logs of ten minutes take 50 MB each
 def _seen(
-    motion: Motion,
-    duration_s: float,
-    suite: str,
-    changes: tuple[tuple[str, Any], ...],
-    seed: int,
-    rates: Rates | None,
+    motion: Motion, duration_s: float, suite: str, changes: tuple[tuple[str, Any], ...], seed: int, rates: Rates | None
 ) -> Log:
     params = suite_params(suite, dict(changes))
     rates = rates or Rates(imu_hz=IMU_HZ, gps_hz=params.gps.rate_hz)

@@ -37,7 +37,7 @@ class Panel:
 
     def __init__(
         self, title: str, y: str, x: str = "time, s", *, log: str = "", legend: str = "best", columns: int = 1,
-        **settings: Any,
+        **settings: Any
     ) -> None:  # fmt: skip
         self.title, self.y, self.x = title, y, x
         self._log, self._legend, self._columns = log, legend, columns
@@ -89,7 +89,7 @@ class Panel:
         self.curve([x] * len(values), values, colour, style="o", ms=size, alpha=0.6, mew=0)
 
     def bars(
-        self, names: Sequence[str], groups: Mapping[str, tuple[Sequence[float], Any]], form: str = "{:.1f}"
+        self, names: Sequence[str], groups: Mapping[str, tuple[Iterable[float], Any]], form: str = "{:.1f}"
     ) -> None:
         """Bars above `names` with their values written on them: `groups` are label -> (values, colour or colours)."""
         self._labelled |= len(groups) > 1
@@ -100,8 +100,9 @@ class Panel:
         def draw(ax: Any) -> None:
             for i, (label, (values, colour)) in enumerate(groups.items()):
                 at = [k + step * (i - 0.5 * (len(groups) - 1)) for k in range(len(names))]
-                bars = ax.bar(at, values, step - 0.02, color=colour, label=label or None)
-                ax.bar_label(bars, [form.format(v) for v in values], padding=2, fontsize=8.5, **backed)
+                heights = list(values)
+                bars = ax.bar(at, heights, step - 0.02, color=colour, label=label or None)
+                ax.bar_label(bars, [form.format(height) for height in heights], padding=2, fontsize=8.5, **backed)
             ax.set_xticks(range(len(names)), names)
             ax.grid(visible=False, axis="x")
 

@@ -112,7 +112,7 @@ class Found:
         claim, finding = self.claim, self.finding
         data: dict[str, Any] = {
             "claim": claim.name, "title": claim.title, "paper": str(claim.paper), "place": claim.place,
-            "says": claim.says, "expected": str(claim.expected),
+            "says": claim.says, "expected": str(claim.expected)
         }  # fmt: skip
         if finding is None:
             return data | {"verdict": None, "problem": self.problem}
