@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from estimator.ap_dcm import ApDcm
-from estimator.ap_dcm.params import ApDcmParams
 from estimator.blocks.compiled import Compiled
 from estimator.gps_velocity import GpsVelocity, GpsVelocityMagnetometer, GpsVelocityParams
 from estimator.interface import Array, AttitudeEstimate, Measurements
+from estimator.params.ap_dcm import ApDcmParams
 from estimator.premerlani import Premerlani, PremerlaniParams
 from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
@@ -76,7 +76,7 @@ def circle(bank_deg: float, wind_m_s: float = 0.0, changes: Mapping[str, Any] = 
     return clean_log("circle", {**of_circle, **changes})
 
 
-def tilts_deg(estimator: Compiled, log: Log, settled: int = SETTLED) -> Array:
+def tilts_deg(estimator: Compiled[Any], log: Log, settled: int = SETTLED) -> Array:
     """Inclination errors of `estimator` over `log` after `settled` ticks."""
     return tilt_deg(estimator.replay(log.measured)["R_eb"], log)[settled:]
 
@@ -235,7 +235,7 @@ def any_vehicle() -> Finding:
     }
     logs = {name: seen(motion, 80.0) for name, motion in motions.items()}
 
-    def tilts(estimator: Compiled, log: Log) -> Array:
+    def tilts(estimator: Compiled[Any], log: Log) -> Array:
         estimator.reset(felt_at_rest(log.truth["R_eb"][0]))  # type: ignore[attr-defined]
         return tilts_deg(estimator, log)
 

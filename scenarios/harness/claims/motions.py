@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.blocks.magnetometer import Calibration
+from estimator.blocks.calibration import Calibration
 from estimator.interface import G_M_S2, Array, ImuSample
 from estimator.premerlani import PremerlaniParams
 from estimator.rotation import inclination_error_rad, rotation_error_rad
