@@ -119,16 +119,6 @@ def test_claims_called_alike_are_refused(monkeypatch):
         claims.__wrapped__()
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(0.02193, "0.0219"), (9.996, "10.0"), (772.4, "772"), (-1.0, "-1.00"), (0.0, "0"), (5.8e-7, "5.8e-07"),
-     (123456.0, "1.2e+05"), (np.nan, "none")],
-)  # fmt: skip
-def test_figures_have_three_digits(value, text):
-    """Claims measure angles and parts in a million alike."""
-    assert console.figures(value) == text
-
-
 def test_seeds_are_those_told_else_as_many_as_each_claim_wants(only):
     """A claim that leaves nothing to chance is given none to fly."""
     given = {}
