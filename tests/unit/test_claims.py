@@ -140,13 +140,13 @@ def test_page_has_summary_lines_condition_and_pictures(only):
     text = page([Found("so", finding((FAILS,), (HOLDS,), "It is, if wet.", 3).undrawn())], "images/claims")
     for part in (
         "1 claims: 0 confirmed, 1 confirmed with a condition, 0 refuted",
-        "| 🟡 | [It is so](#so) | fails | 3.00 deg | ≤ 2.00 deg |",
+        "| 🟡 | [It is so](#so) | fails | 3.00 deg | ≤ 2 deg |",
         '<a id="so"></a>',
         "> So it is.",
         "*GPS, somewhere*",
         "**Confirmed with a condition**, over 3 seeds. It is, if wet.",
-        "| fails | 3.00 deg | ≤ 2.00 deg | **no** |",
-        "| *if it rains:* | | | |\n| holds | 1.00 deg | ≤ 2.00 deg | yes |",
+        "| fails | 3.00 deg | ≤ 2 deg | **no** |",
+        "| *if it rains:* | | | |\n| holds | 1.00 deg | ≤ 2 deg | yes |",
         "![It is so](images/claims/so.png)",
     ):
         assert part in text
@@ -158,7 +158,7 @@ def test_command_answers_with_one_where_a_verdict_differs(only, capsys, expected
     only(claim("so", expected=expected))
     assert run(["claims", "--workers", "1"]) == code
     out, err = capsys.readouterr()
-    assert "so   confirmed   holds: 1.00 deg (<= 2.00)" in out
+    assert "so   confirmed   holds: 1.00 deg, limit <= 2 deg" in out
     assert err == ("wingslevel: claim so: confirmed, where refuted was expected\n" if code else "")
 
 
