@@ -133,7 +133,7 @@ class CEstimator:
         self._measured["struct_size"] = MEASUREMENTS.itemsize
         self._answer = _BLANK.copy()
         self._into, self._from = self._measured.ctypes.data, self._answer.ctypes.data
-        self._question, self._reply = (memoryview(struct.view(np.uint8)) for struct in (self._measured, self._answer))
+        self._question, self._reply = (struct.view(np.uint8).data for struct in (self._measured, self._answer))
         self._R_eb, self._omega_b_rad_s, self._gyro_bias_b_rad_s, self._wind_e_m_s = (
             self._answer[name][0] for name in ("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "wind_e_m_s")
         )
