@@ -11,13 +11,13 @@ from estimator.blocks.calibration import Calibration, hard_iron_from_extremes
 from estimator.dilshad import heading_of_field
 from estimator.interface import Array
 from estimator.rotation import from_euler, heading_rad
-from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
 from scenarios.harness.claims.motions import DECLINATION_RAD, FIELD_E_UT, seen
 from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, Panel
 from scenarios.harness.metrics import highest, rms
 from sim.motion.hover import Hover
 from sim.motion.turn_table import TurnTable
+from sim.rows import Row
 
 BOARD = "dilshad_9dof"
 MAGNET_UT = (10.0, -6.0, 15.0)

@@ -8,7 +8,6 @@ import numpy as np
 from estimator.baselines import GyroOnly
 from estimator.interface import G_M_S2, ImuSample
 from estimator.premerlani import Premerlani
-from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
 from scenarios.harness.claims.flights import flights, rms_of_each
 from scenarios.harness.claims.motions import IMU_HZ, aboard, attitude_deg, begin, misread, printed, sensed, tilt_deg
@@ -16,6 +15,7 @@ from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, Panel
 from scenarios.harness.metrics import inclination_error_deg, rms
 from sim.loop import mean_sample
 from sim.motion.prescribed_plant import HandHeld, Motion, Rest, SteadyTurn, StraightLevel
+from sim.rows import Row
 
 FEW_DEG = 5.0  # "a few degrees"
 MINUTE = round(60.0 * IMU_HZ) - 1  # the tick that ends the first minute

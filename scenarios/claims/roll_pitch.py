@@ -16,7 +16,6 @@ from estimator.gps_velocity import GpsVelocity, GpsVelocityMagnetometer, GpsVelo
 from estimator.interface import Array, AttitudeEstimate, Measurements
 from estimator.params.ap_dcm import ApDcmParams
 from estimator.premerlani import Premerlani, PremerlaniParams
-from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
 from scenarios.harness.claims.flights import NOTHING, clean_log, flights, percentage
 from scenarios.harness.claims.motions import (
@@ -33,6 +32,7 @@ from scenarios.harness.metrics import highest, inclination_error_deg, rms, survi
 from sim.log import Flight, Log
 from sim.motion.hover import Hover
 from sim.motion.prescribed_plant import Loop, Motion, SteadyTurn
+from sim.rows import Row
 
 WEIGHT = 0.5  # of the roll-pitch correction, 1/s, for every estimator here
 AT_ONCE = {"gps_filter_s": 0.0, "gps_latency_s": 0.0}

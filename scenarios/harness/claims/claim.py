@@ -29,8 +29,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Literal
 
-from scenarios.harness.checks import Row
 from scenarios.harness.claims.picture import Panel
+from sim.rows import Row
 
 
 class Paper(StrEnum):

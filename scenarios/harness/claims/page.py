@@ -7,12 +7,11 @@ from pathlib import Path
 
 from rich.text import Text
 
-from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict
 from scenarios.harness.claims.run import Findings, Found
 from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import refusal, write
-from sim.outside.wording import markdown
+from sim.rows import Row, markdown_cells
 
 MARKS = {Verdict.CONFIRMED: "✅", Verdict.WITH_CONDITION: "🟡", Verdict.REFUTED: "❌"}
 COLOURS = {Verdict.CONFIRMED: "green", Verdict.WITH_CONDITION: "yellow", Verdict.REFUTED: "red"}
@@ -51,7 +50,8 @@ def page(found: Sequence[Found], pictures: str) -> str:
         lines += [f"**{paper.short}**", "", "| | claim | deciding line | measured | limit |", "|-|-|-|-:|-:|"]
         for f, finding in its:
             link = f"[{f.claim.title}](#{f.name})"
-            lines.append(f"| {MARKS[finding.verdict]} | {link} | {_cells(finding.deciding_line)} |")
+            cells = " | ".join(markdown_cells(finding.deciding_line))
+            lines.append(f"| {MARKS[finding.verdict]} | {link} | {cells} |")
         lines.append("")
     for paper, its in _by_paper(measured):
         lines += [f"## {paper}", ""]
@@ -98,14 +98,7 @@ def _basis(found: Found) -> str:
 
 
 def _row(row: Row) -> str:
-    return f"| {_cells(row)} | {'yes' if row.passed else '**no**'} |"
-
-
-def _cells(row: Row) -> str:
-    """Name, measured value and limit, with units, as three cells."""
-    unit = f" {markdown(row.unit)}" if row.unit else ""
-    limit = f"{'≤' if row.sense == '<=' else '≥'} {console.figures(row.limit)}{unit}"
-    return f"{markdown(row.name)} | {console.figures(row.measured)}{unit} | {limit}"
+    return f"| {' | '.join(markdown_cells(row))} | {'yes' if row.passed else '**no**'} |"
 
 
 def picture_folder(page: Path | None, pictures: Path | None) -> Path | None:
@@ -166,9 +159,7 @@ def _console_row(found: Found) -> tuple[str, Text, str]:
         return found.name, Text("not measured", "bold red"), found.problem
     verdict, row = found.finding.verdict, found.finding.deciding_line
     word = "conditional" if verdict == Verdict.WITH_CONDITION else str(verdict)
-    measured = f"{console.figures(row.measured)} {row.unit}".strip()
-    decided = f"{row.name}: {measured} ({row.sense} {console.figures(row.limit)})"
-    return found.name, Text(word, COLOURS[verdict]), decided
+    return found.name, Text(word, COLOURS[verdict]), f"{row.name}: {row.sentence}"
 
 
 def _print_details(found: Found) -> None:
@@ -179,8 +170,8 @@ def _print_details(found: Found) -> None:
     if finding is None:
         return
     out.print(Text(f"result   {finding.summary}"))
-    out.print(console.verdict_table("", finding.lines, console.figures))
+    out.print(console.verdict_table("", finding.lines))
     if finding.conditional_lines:
-        out.print(console.verdict_table(finding.condition, finding.conditional_lines, console.figures))
+        out.print(console.verdict_table(finding.condition, finding.conditional_lines))
     verdict = Text(str(finding.verdict), f"bold {COLOURS[finding.verdict]}")
     out.print(verdict.append(f", {_basis(found)}", "not bold default"))

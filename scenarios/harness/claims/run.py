@@ -18,7 +18,7 @@ from scenarios.harness.claims.claim import Claim, Finding, Paper
 from scenarios.harness.claims.picture import png
 from scenarios.harness.cli import console
 from scenarios.harness.gate.workers import fly_each
-from scenarios.harness.verdict import FAILED, PASSED, SIMULATION_FAILED, plain
+from scenarios.harness.verdict import FAILED, PASSED, SIMULATION_FAILED
 from sim.log import Outcome
 from sim.params import near_misses
 
@@ -120,9 +120,9 @@ class Found:
             "verdict": str(finding.verdict),
             "summary": finding.summary,
             "seeds": self.seeds,
-            "lines": [plain(row) for row in finding.lines],
+            "lines": [row.to_json() for row in finding.lines],
             "condition": finding.condition,
-            "conditional_lines": [plain(row) for row in finding.conditional_lines],
+            "conditional_lines": [row.to_json() for row in finding.conditional_lines],
         }
 
 
