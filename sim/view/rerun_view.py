@@ -98,7 +98,7 @@ def _encoded(flight: Flight, path: Path) -> bytes:
     lines = curves(log, flight.heading_reference) if len(log) else {}
     stream = rec.binary_stream()  # type: ignore[misc] # attached to the class by another module
     layout = blueprint(log, flight.release_s, limits(log, lines))
-    rec.sendblueprint(layout, make_active=False, make_default=True)
+    rec.send_blueprint(layout, make_active=False, make_default=True)
     _send_fixed(rec, scene)
     _send_rows(rec, scene, log, lines, 0)
     _send_end(rec, flight)
