@@ -43,7 +43,7 @@ def test_record_estimate_of_lists_and_single_precision_is_accepted(flown):
     ("change", "fault"),
     [
         ({"R_eb": np.full((3, 3), np.nan)}, "not finite"),
-        ({"R_eb": 1.01 * np.eye(3)}, "no rotation"),
+        ({"R_eb": 1.01 * np.eye(3)}, "not a rotation"),
         ({"R_eb": np.diag([1.0, 1.0, -1.0])}, "reflection"),
         ({"R_eb": np.eye(4)}, "shape"),
         ({"R_eb": np.zeros(9)}, "shape"),

@@ -17,7 +17,7 @@ from sim.outside.drafts import hidden, new_folder, probe, sweep
 @pytest.fixture(scope="module")
 def dead():
     """The mark of a process that has ended."""
-    code = "from estimator import owner; print(owner.mark())"
+    code = "from estimator.compiler import owner; print(owner.mark())"
     root = Path(owner.__file__).parents[1]
     return subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True).stdout[
         :-1

@@ -217,7 +217,7 @@ def test_fault_of_what_there_is_not_is_refused(arguments, words):
         ({"faults": ["mag:stuck@3"]}, "no magnetometer fitted"),
         (
             {"faults": ["gyro:saturated@3"], "suite": "ideal"},
-            "this gyro has no full scale; set gyro.range_deg_s to a finite number of deg/s, or choose a suite whose",
+            "this gyro has no full scale; set gyro.range_deg_s to a finite number of deg/s, choose a suite whose",
         ),
         (
             {"faults": ["baro:saturated@3"], "suite": "ideal"},
