@@ -256,7 +256,7 @@ def test_cache_temporary_files_of_the_dead_go_and_those_of_the_living_stay(here)
 def dead_mark():
     """The mark of a process that has ended."""
     return subprocess.run(
-        [sys.executable, "-c", "from estimator import owner; print(owner.mark())"],
+        [sys.executable, "-c", "from estimator.compiler import owner; print(owner.mark())"],
         cwd=ROOT, capture_output=True, text=True, check=True,
     ).stdout.strip()  # fmt: skip
 
