@@ -16,7 +16,7 @@ from autopilot.energy import (
     throttle_to_recover,
     want_airspeed,
 )
-from autopilot.failsafe import POOR, circle, examine, listen, mode_in_force
+from autopilot.failsafe import circle, examine, listen, mode_in_force
 from autopilot.guidance import (
     agility,
     bank_for_heading,
@@ -28,14 +28,30 @@ from autopilot.guidance import (
     unseen_turn,
     way_wanted,
 )
-from autopilot.interface import MOST_WAYPOINTS, ActuatorCommand, Mode, Setpoint
+from autopilot.interface import (
+    CIRCLE,
+    COURSE,
+    GLIDE,
+    LAUNCH,
+    LEVEL,
+    LOITER,
+    LOW,
+    MANUAL,
+    MOST_WAYPOINTS,
+    RATE,
+    RETURN,
+    STABILISE,
+    WAYPOINTS,
+    ActuatorCommand,
+    Setpoint,
+)
 from autopilot.launch import climb_away, feel_throw
 from autopilot.mixer import mix
 from autopilot.route import bank_along_route, bank_to_circle
 from autopilot.stabilise import rate_control, rate_demand
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
-from estimator.interface import AttitudeEstimate, HeadingReference, Measurements
+from estimator.interface import POOR, AttitudeEstimate, HeadingReference, Measurements
 
 
 def _floats(params: type[Any]) -> np.dtype[Any]:
@@ -93,7 +109,6 @@ _STATE = np.dtype(
 # One array with everything the kernel needs besides the inputs of a tick: each array argument costs time per call.
 _MEMORY = np.dtype([("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8")], align=True)
 
-MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW = (int(m) for m in Mode)
 _WIND_UNKNOWN = np.full(3, np.nan)
 _DT_LIMIT_S = 0.1  # longer sample intervals are gaps and are not integrated in full
 

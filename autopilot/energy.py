@@ -25,10 +25,11 @@ import math
 from dataclasses import dataclass
 
 from autopilot.guidance import gps_age, height, is_wind, unit
-from autopilot.stabilise import G_M_S2, far_off
+from autopilot.stabilise import far_off
 from estimator.blocks.kernels import clip
 from estimator.blocks.screening import AIRSPEED_RANGE_M_S
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 
 
 @dataclass(frozen=True, slots=True)

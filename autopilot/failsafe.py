@@ -34,14 +34,23 @@ from dataclasses import dataclass
 
 from autopilot.energy import hold_height
 from autopilot.guidance import gps_age, is_fix
-from autopilot.interface import Mode
+from autopilot.interface import (
+    CIRCLE,
+    COURSE,
+    GLIDE,
+    LAUNCH,
+    LEVEL,
+    LOITER,
+    LOW,
+    MANUAL,
+    RATE,
+    RETURN,
+    WAYPOINTS,
+)
 from estimator.blocks.screening import GYRO_RANGE_RAD_S
 from estimator.compiler.jit import kernel
-from estimator.interface import Health
+from estimator.interface import GOOD, POOR
 from estimator.rotation import integrate
-
-MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW = (int(m) for m in Mode)
-GOOD, POOR = int(Health.GOOD), int(Health.POOR)
 
 
 @dataclass(frozen=True, slots=True)

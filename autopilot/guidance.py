@@ -10,14 +10,13 @@ Source: Premerlani & Bizard, Direction Cosine Matrix IMU: Theory, "Using DCM in 
 import math
 from dataclasses import dataclass
 
-from autopilot.interface import Mode
+from autopilot.interface import COURSE, RETURN
 from autopilot.stabilise import shorter_way
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
 
 MOST_M, MOST_M_S = 1e6, 1000.0  # limits of a valid fix
 MOST_WIND_M_S = 100.0  # limit of a valid wind
-COURSE, RETURN = int(Mode.COURSE), int(Mode.RETURN)
 
 
 @dataclass(frozen=True, slots=True)

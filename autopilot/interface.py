@@ -25,6 +25,10 @@ class Mode(IntEnum):
     LOW = 11  # too close to the ground: climbs on course with little bank
 
 
+# As plain integers, for kernels: numba is slow with enumerations.
+MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW = (int(m) for m in Mode)
+
+
 class Waypoint(NamedTuple):
     """A point of a route, relative to the launch point."""
 

@@ -24,9 +24,10 @@ import math
 from dataclasses import dataclass
 
 from autopilot.guidance import gps_age, heading_error, is_wind, unit
-from autopilot.stabilise import G_M_S2, shorter_way
+from autopilot.stabilise import shorter_way
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,7 @@ from dataclasses import dataclass
 
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
-
-G_M_S2 = 9.80665
+from estimator.interface import G_M_S2
 
 
 @dataclass(frozen=True, slots=True)

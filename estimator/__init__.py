@@ -52,6 +52,7 @@ ESTIMATORS: dict[str, str] = {
     "ins_ekf": "estimator.ins_ekf.ins_ekf:InsEkf",
     "starlino": "estimator.starlino:Starlino",
     "dilshad": "estimator.dilshad:Dilshad",
+    "complementary": "estimator.complementary:Complementary",
     "gyro_only": "estimator.baselines:GyroOnly",
     "accelerometer_only": "estimator.baselines:AccelerometerOnly",
     "peer_madgwick": "estimator.peers.peers:Madgwick",

@@ -51,7 +51,6 @@ from estimator.blocks.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, ta
 from estimator.blocks.pi import feed_back
 from estimator.blocks.screening import (
     FORCE_RANGE_M_S2,
-    G_M_S2,
     GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
@@ -63,7 +62,7 @@ from estimator.blocks.screening import (
 )
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
 
 FIX_LIFE_S = 2.5  # reports further apart are compared no more
 LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+G_M_S2 = 9.80665  # standard gravity: what 1 g means on a data sheet
 
 
 class Column(NamedTuple):
@@ -152,6 +153,9 @@ class Health(IntEnum):
     STARTING = 0  # before power-up ended, or heading not yet found
     GOOD = 1
     POOR = 2  # coasting on gyros, samples being rejected
+
+
+STARTING, GOOD, POOR = (int(health) for health in Health)  # for kernels: numba is slow with enumerations
 
 
 NO_RATE = np.zeros(3)

@@ -58,7 +58,6 @@ from estimator.blocks.compiled import BELIEF, WIND, Compiled, write_estimate, wr
 from estimator.blocks.kernels import clip, wrap
 from estimator.blocks.screening import (
     FORCE_GOOD,
-    G_M_S2,
     GPS,
     SCREEN,
     attitude_at_rest,
@@ -68,7 +67,7 @@ from estimator.blocks.screening import (
     take_rate,
 )
 from estimator.compiler.jit import kernel
-from estimator.interface import Column, HeadingReference, ImuSample, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, dtype_of
 from estimator.matrixpilot_params import CLASSIC as CLASSIC
 from estimator.matrixpilot_params import UDB4 as UDB4
 from estimator.matrixpilot_params import UDB5 as UDB5

@@ -75,7 +75,6 @@ from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
 from estimator.blocks.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
-    G_M_S2,
     GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
@@ -87,7 +86,7 @@ from estimator.blocks.screening import (
 )
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.rotation import integrate
 
 FIX_LIFE_S = 2.0  # an older fix corrects nothing any more

@@ -58,7 +58,6 @@ from estimator.blocks.magnetometer import (
 from estimator.blocks.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
-    G_M_S2,
     GYRO_RANGE_RAD_S,
     SCREEN,
     attitude_at_rest,
@@ -67,7 +66,7 @@ from estimator.blocks.screening import (
     take_rate,
 )
 from estimator.compiler.jit import kernel
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
 
 ZERO = (0.0, 0.0, 0.0)
 SMALL_RAD = 0.1  # "small": larger rotations are applied in parts

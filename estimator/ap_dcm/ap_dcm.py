@@ -42,7 +42,6 @@ from estimator.blocks.kernels import clip, wrap
 from estimator.blocks.magnetometer import FIELD, take_field, write_calibration
 from estimator.blocks.screening import (
     FORCE_GOOD,
-    G_M_S2,
     GPS,
     SCREEN,
     airspeed_came,
@@ -53,7 +52,7 @@ from estimator.blocks.screening import (
     take_rate,
 )
 from estimator.compiler.jit import kernel
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate, renormalise_exactly
 
 LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost

@@ -17,9 +17,9 @@ import math
 
 import numpy as np
 
-from estimator.blocks.screening import COAST_S, FORCE_GOOD, G_M_S2, LONGEST_GAP_S
+from estimator.blocks.screening import COAST_S, FORCE_GOOD, LONGEST_GAP_S
 from estimator.compiler.jit import inlined, kernel
-from estimator.interface import Array, Column
+from estimator.interface import G_M_S2, Array, Column
 from estimator.rotation import integrate, level, renormalise
 
 HISTORY, SPACING_S = 640, 0.0199  # remembered instants and their least distance: 12.7 s at any sample rate

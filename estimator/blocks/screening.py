@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import inlined
-from estimator.interface import Array, Column, ImuSample
+from estimator.interface import G_M_S2, Array, Column, ImuSample
 from estimator.rotation import from_euler
 
-G_M_S2 = 9.80665
 SHORTEST_INTERVAL_S = 1e-6  # no gyro samples faster, and what is divided by an interval stays finite
 LONGEST_GAP_S = 0.5  # a longer silence says nothing of the attitude: the estimate goes on from where it was
 CLOCK_BACK_S = 1.0  # a time this far back is no late sample but a clock that was set

@@ -60,7 +60,6 @@ from estimator.blocks.compiled import BELIEF, WIND, Compiled, write_estimate, wr
 from estimator.blocks.magnetometer import FIELD, take_field, write_calibration
 from estimator.blocks.screening import (
     FORCE_GOOD,
-    G_M_S2,
     GPS,
     GYRO_GOOD,
     SCREEN,
@@ -99,7 +98,7 @@ from estimator.ins_ekf.kernels import (
     turn_in_body,
 )
 from estimator.ins_ekf.params import FLOORS, InsEkfParams
-from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.rotation import level, renormalise
 
 LONGEST_STAMPED_S = 2.0  # a stamp further back is of another clock

@@ -29,8 +29,8 @@ R. S. Bucy and P. D. Joseph, "Filtering for Stochastic Processes with Applicatio
 import numpy as np
 
 from estimator.blocks.kernels import clip
-from estimator.blocks.screening import G_M_S2
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 
 N = 21
 TILT, VEL, BIAS, GAIN, FORCE, LAG, WIND_NE, LATENCY = 0, 3, 6, 9, 12, 15, 18, 20

@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 from estimator.blocks.magnetometer import FIELD_RANGE_UT, Calibration
-from estimator.blocks.screening import FORCE_RANGE_M_S2, G_M_S2, GYRO_RANGE_RAD_S
+from estimator.blocks.screening import FORCE_RANGE_M_S2, GYRO_RANGE_RAD_S
+from estimator.interface import G_M_S2
 
 LONGEST_LATENCY_S = 12.5
 LONGEST_LEARNT_S = 2.0  # a latency is learnt between 0 and this, or the given one plus `LEARNT_SIGMAS`

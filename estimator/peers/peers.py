@@ -48,8 +48,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.blocks.screening import G_M_S2
-from estimator.interface import Array, HeadingReference, Instrument
+from estimator.interface import G_M_S2, Array, HeadingReference, Instrument
 from estimator.peers.peer import EAST_NORTH_UP, LEFT_UP, NORTH_WEST_UP, Heard, Keeping, Peer, PeerParams, package
 
 NO_FORCE, NO_FIELD = np.zeros(3), np.zeros(3)

@@ -11,13 +11,12 @@ from matplotlib.figure import Figure
 from estimator.blocks.magnetometer import Calibration, hard_iron_from_extremes
 from estimator.dilshad import heading_of_field
 from estimator.interface import Array
-from estimator.rotation import heading_rad
+from estimator.rotation import from_euler, heading_rad
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claims.motions import DECLINATION_RAD, FIELD_E_UT, seen
 from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
 from scenarios.harness.metrics import highest, rms
 from sim.motion.hover import Hover
-from sim.motion.prescribed_plant import rotation_from_euler
 from sim.motion.turn_table import TurnTable
 
 BOARD = "dilshad_9dof"
@@ -110,7 +109,7 @@ def printed_heading_rad(m_b: Array, roll_rad: Array, pitch_rad: Array) -> Array:
 def tilted(roll_deg: float, pitch_deg: float) -> tuple[Array, Array]:
     """Attitudes all the way round with that tilt, and the field that they see."""
     yaw = np.radians(np.arange(0.0, 360.0, 2.0)) + 1e-3
-    R_eb = rotation_from_euler(math.radians(roll_deg), math.radians(pitch_deg), yaw)
+    R_eb = from_euler(math.radians(roll_deg), math.radians(pitch_deg), yaw)
     return R_eb, np.einsum("nij,i->nj", R_eb, FIELD_E_UT)
 
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.interface import Array
 from estimator.premerlani import Premerlani
-from estimator.rotation import heading_error_rad
+from estimator.rotation import from_euler, heading_error_rad
 from scenarios.claims._open_loop import (
     STEP_S,
     aboard,
@@ -27,7 +27,7 @@ from scenarios.harness.claims.flights import flights
 from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, VIOLET, axes, label
 from scenarios.harness.metrics import Series, inclination_error_deg, rms, settled_after_s
 from sim.log import Phase
-from sim.motion.prescribed_plant import Kinematics, SteadyTurn, StraightLevel, rotation_from_euler
+from sim.motion.prescribed_plant import Kinematics, SteadyTurn, StraightLevel
 
 TILT_DEG, WATCHED_S = 9.0, 20.0
 
@@ -156,7 +156,7 @@ WEIGHTS = (0.03, 0.1, 0.3, 1.0, 3.0)
 def _recovery_s(weight: float) -> float:
     """Until a tenth is left of a bank estimated 35 degrees wrong, in straight flight."""
     log = sensed(StraightLevel(), 120.0)
-    wrong = log.truth["R_eb"][0] @ rotation_from_euler(np.full(1, math.radians(FROM_DEG)), 0.0, 0.0)[0]
+    wrong = log.truth["R_eb"][0] @ from_euler(np.full(1, math.radians(FROM_DEG)), 0.0, 0.0)[0]
     out = begin(Premerlani(printed(w_rp=weight, k_i=0.0)), wrong).replay(log.measured)
     error = inclination_deg(out["R_eb"], log)
     return settled_after_s(Series(log.truth["t_s"], error, np.ones(len(error), bool)), TENTH)
@@ -229,7 +229,7 @@ class Pause:
             way += sign * self.speed_m_s * (0.5 * (since - np.sin(w * since) / w) + after)
         still = np.zeros((len(t_s), 3))
         north = np.array([1.0, 0.0, 0.0])
-        R_eb = rotation_from_euler(0.0, 0.0, 0.0 * t_s)
+        R_eb = from_euler(0.0, 0.0, 0.0 * t_s)
         p_e = way[:, None] * north - [0.0, 0.0, 60.0]
         return Kinematics(R_eb, still, p_e, speed[:, None] * north, a[:, None] * north)
 

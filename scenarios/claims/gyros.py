@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from estimator.baselines import GyroOnly
-from estimator.interface import ImuSample
+from estimator.interface import G_M_S2, ImuSample
 from estimator.premerlani import Premerlani
 from scenarios.claims._open_loop import (
     IMU_HZ,
@@ -212,7 +212,7 @@ def _no_accumulation(_seeds: Sequence[int]) -> Finding:
     log = sensed(StraightLevel(), LONG_S)
     t_s, start = log.truth["t_s"], log.truth["R_eb"][0]
     rows = log.measured.copy()
-    rows["force_b_m_s2"][:, 1] += BIAS_G * 9.80665
+    rows["force_b_m_s2"][:, 1] += BIAS_G * G_M_S2
     leaning = inclination_deg(begin(Premerlani(aboard()), start).replay(rows)["R_eb"], log)
     offset = np.radians([GYRO_DEG_S, 0.0, 0.0])
     turning = inclination_deg(begin(GyroOnly(), start).replay(misread(log, offset_rad_s=offset))["R_eb"], log)

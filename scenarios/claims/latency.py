@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from estimator.interface import Array
+from estimator.rotation import from_euler
 from scenarios.claims._flown import PUBLISHED, TURNING_DEG, course_error_deg, pooled_rms, rms_in_turns, tuned
 from scenarios.claims._open_loop import sensed
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
@@ -16,7 +17,7 @@ from scenarios.harness.claims.flights import flights
 from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import bank_size_deg, heading_error_deg, inclination_error_deg, time_s
 from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, Kinematics, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics
 
 COURSE = heading_error_deg("course")
 SETTLED_S = 20.0
@@ -42,7 +43,7 @@ class Kink:
         v_e, p_e = still.copy(), still.copy()
         v_e[:, 0], v_e[:, 1] = self.speed_m_s * np.cos(yaw), self.speed_m_s * np.sin(yaw)
         p_e[:, 0], p_e[:, 1], p_e[:, 2] = self.speed_m_s * before, self.speed_m_s * after, -60.0
-        return Kinematics(rotation_from_euler(0.0, 0.0, yaw), still, p_e, v_e, still)
+        return Kinematics(from_euler(0.0, 0.0, yaw), still, p_e, v_e, still)
 
 
 def _filter_settles(_seeds: Sequence[int]) -> Finding:

@@ -7,8 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from estimator.blocks.screening import G_M_S2
-from estimator.interface import Array
+from estimator.interface import G_M_S2, Array
 from estimator.rotation import inclination_error_rad
 from scenarios.claims._flown import PUBLISHED, pooled_rms, slowest, tuned
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line

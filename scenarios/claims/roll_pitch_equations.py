@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from estimator.blocks.screening import G_M_S2
-from estimator.interface import Array
+from estimator.interface import G_M_S2, Array
 from estimator.rotation import heading_error_rad, integrate
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claims.flights import flights

@@ -12,6 +12,7 @@ from autopilot.guidance import heading_error
 from estimator.blocks.kernels import wrap
 from estimator.interface import Array
 from estimator.premerlani import Premerlani
+from estimator.rotation import from_euler
 from scenarios.claims._flown import course_rad
 from scenarios.claims._open_loop import aboard, begin, inclination_deg, sensed
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
@@ -21,7 +22,7 @@ from scenarios.harness.metrics import survived, time_s
 from scenarios.harness.metrics.manoeuvres import inverted
 from scenarios.inverted import FIRST_S, LEGS
 from sim.log import Flight, Log, Phase
-from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, SteadyTurn, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, SteadyTurn
 
 FLOWN_S, SETTLED_S = 120.0, 20.0
 BANK_RAD = math.radians(20.0)
@@ -46,7 +47,7 @@ class OnItsBack:
         rate = upright.turn_rate_rad_s
         roll = self.bank_rad + math.pi
         omega_b = np.tile([0.0, rate * math.sin(roll), rate * math.cos(roll)], (len(t_s), 1))
-        R_eb = rotation_from_euler(roll, 0.0, rate * t_s)
+        R_eb = from_euler(roll, 0.0, rate * t_s)
         return Kinematics(R_eb, omega_b, path.p_e_m, path.v_e_m_s, path.a_e_m_s2)
 
 
@@ -101,7 +102,7 @@ def _upside_down(seeds: Sequence[int]) -> Finding:
     found, steering, tilt = {}, {}, {}
     for way, log in logs.items():
         roll_rad = math.pi if way == "back" else 0.0
-        start = rotation_from_euler(np.array([roll_rad]), 0.0, OFF_RAD)[0]  # wings level, the heading 40 degrees wrong
+        start = from_euler(np.array([roll_rad]), 0.0, OFF_RAD)[0]  # wings level, the heading 40 degrees wrong
         R_eb = found[way] = begin(Premerlani(aboard()), start).replay(log.measured)["R_eb"]
         steering[way], tilt[way] = _steering_error_deg(R_eb, log), inclination_deg(R_eb, log)
     later = logs["back"].truth["t_s"] > SETTLED_S

@@ -10,13 +10,14 @@ from matplotlib.figure import Figure
 
 from estimator.interface import Array
 from estimator.premerlani import Premerlani
+from estimator.rotation import from_euler
 from scenarios.claims._flown import slowest
 from scenarios.claims._open_loop import attitude_deg, begin, misread, printed, sensed
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
 from scenarios.harness.metrics import Series, settled_after_s
 from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, Kinematics, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,7 @@ class UpAndOn:
         along = np.stack([np.cos(pitch), nothing, -np.sin(pitch)], axis=-1)
         across = np.stack([-np.sin(pitch), nothing, -np.cos(pitch)], axis=-1)
         return Kinematics(
-            rotation_from_euler(0.0, pitch, nothing),
+            from_euler(0.0, pitch, nothing),
             np.stack([nothing, rate, nothing], axis=-1),
             np.stack([north, nothing, -height], axis=-1),
             V * along,

@@ -19,9 +19,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.blocks.screening import AT_REST_G, AT_REST_RAD_S, G_M_S2
+from estimator.blocks.screening import AT_REST_G, AT_REST_RAD_S
 from estimator.instruments import PROPERTIES, Instruments, Known, to_json
-from estimator.interface import Array, AttitudeEstimator, ImuSample, Measurements
+from estimator.interface import G_M_S2, Array, AttitudeEstimator, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
 from scenarios.harness.cli import console
 from scenarios.harness.config import literal

@@ -18,13 +18,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimator.interface import Array
+from estimator.interface import G_M_S2, Array
 from sim.aeroplane.linear import ASYMMETRIC, SYMMETRIC, LinearModel, Mode, derivative
 
 if TYPE_CHECKING:
     from sim.aeroplane.jsbsim_model import Model
 
-G_M_S2 = 9.80665
 U, V, W, P, Q, R, ROLL, PITCH = range(8)
 
 

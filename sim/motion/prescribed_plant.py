@@ -13,6 +13,7 @@ import numpy as np
 
 from autopilot.interface import ActuatorCommand
 from estimator.interface import Array
+from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.log import TRUTH_DTYPE, Log, Outcome, Phase
 from sim.place import LATITUDE_DEG
@@ -60,18 +61,6 @@ def _matrices(*rows: Array) -> Array:
     return np.stack(np.broadcast_arrays(*rows), axis=-2)
 
 
-def rotation_from_euler(roll_rad: Array | float, pitch_rad: Array | float, yaw_rad: Array | float) -> Array:
-    """Body-to-earth rotations, shape (n, 3, 3): yaw, then pitch, then roll, each shape (n,) or a number."""
-    sr, cr = np.sin(roll_rad), np.cos(roll_rad)
-    sp, cp = np.sin(pitch_rad), np.cos(pitch_rad)
-    sy, cy = np.sin(yaw_rad), np.cos(yaw_rad)
-    return _matrices(
-        _vectors(cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy),
-        _vectors(cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy),
-        _vectors(-sp, sr * cp, cr * cp),
-    )
-
-
 def _require(motion: object, name: str, unit: str, right: bool, choose: str) -> None:
     if not right:
         raise ValueError(f"{type(motion).__name__}.{name} = {getattr(motion, name)!r} {unit}: choose {choose}")
@@ -91,7 +80,7 @@ class Rest:
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
         still = np.zeros((len(t_s), 3))
-        R_eb = rotation_from_euler(self.roll_rad, self.pitch_rad, self.heading_rad + 0.0 * t_s)
+        R_eb = from_euler(self.roll_rad, self.pitch_rad, self.heading_rad + 0.0 * t_s)
         return Kinematics(R_eb, still, still - _vectors(0.0, 0.0, self.height_m), still, still)
 
 
@@ -121,7 +110,7 @@ class HandHeld:
         omega_b = _vectors(droll - dyaw * sp, dpitch * cr + dyaw * sr * cp, dyaw * cr * cp - dpitch * sr)
         still = np.zeros((len(t_s), 3))
         p_e = still - _vectors(0.0, 0.0, self.height_m)
-        return Kinematics(rotation_from_euler(roll, pitch, yaw), omega_b, p_e, still, still)
+        return Kinematics(from_euler(roll, pitch, yaw), omega_b, p_e, still, still)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +158,7 @@ class FreeFall:
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
         return Kinematics(
-            rotation_from_euler(0.0, self.tumble_rad_s * t_s, 0.0),
+            from_euler(0.0, self.tumble_rad_s * t_s, 0.0),
             _vectors(0.0, self.tumble_rad_s + 0.0 * t_s, 0.0),
             _vectors(0.0, 0.0, 0.5 * GRAVITY_M_S2 * t_s**2 - self.height_m),
             _vectors(0.0, 0.0, GRAVITY_M_S2 * t_s),
@@ -205,7 +194,7 @@ class StraightLevel:
         speed = self.airspeed_m_s + self.surge_m_s2 / w * np.sin(w * t)
         way = self.airspeed_m_s * t + self.surge_m_s2 / w**2 * (1.0 - np.cos(w * t))
         return Kinematics(
-            rotation_from_euler(0.0, 0.0, self.heading_rad + 0.0 * t_s),
+            from_euler(0.0, 0.0, self.heading_rad + 0.0 * t_s),
             np.zeros((len(t_s), 3)),
             way * nose + wind * t - [0.0, 0.0, self.height_m],
             speed * nose + wind,
@@ -248,7 +237,7 @@ class SteadyTurn:
         wind = np.array(self.wind_e_m_s)
         p_air = _vectors(chord * np.cos(mean_yaw), chord * np.sin(mean_yaw), -self.height_m)
         return Kinematics(
-            rotation_from_euler(self.bank_rad, 0.0, yaw),
+            from_euler(self.bank_rad, 0.0, yaw),
             np.tile(omega_b, (len(t_s), 1)),
             p_air + wind * t_s[:, None],
             V * _vectors(cosine, sine, 0.0) + wind,
@@ -281,7 +270,7 @@ class Loop:
         wind = np.array(self.wind_e_m_s)
         p_air = V / q * _vectors(sp * cy, sp * sy, cp - 1.0) - [0.0, 0.0, self.height_m]
         return Kinematics(
-            rotation_from_euler(0.0, pitch, self.heading_rad),
+            from_euler(0.0, pitch, self.heading_rad),
             _vectors(0.0, q + 0.0 * t_s, 0.0),
             p_air + wind * t_s[:, None],
             V * _vectors(cp * cy, cp * sy, -sp) + wind,

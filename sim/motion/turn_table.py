@@ -12,8 +12,9 @@ from typing import ClassVar
 import numpy as np
 
 from estimator.interface import Array
+from estimator.rotation import from_euler
 from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, Kinematics, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics
 
 # Body axis and angle of each turn; the axes x, y, z start north, east, down (magnetic).
 _PARTS = ((1, 2.0 * math.pi), (2, 0.5 * math.pi), (0, 2.0 * math.pi), (1, 0.5 * math.pi), (2, 2.0 * math.pi))
@@ -49,7 +50,7 @@ class TurnTable:
         """See `Motion.at`."""
         still = np.zeros((len(t_s), 3))
         omega_b = still.copy()
-        R_eb = rotation_from_euler(0.0, 0.0, self.heading_rad + 0.0 * t_s)
+        R_eb = from_euler(0.0, 0.0, self.heading_rad + 0.0 * t_s)
         start_s = 0.0
         for axis, angle_rad in _PARTS:
             lasts_s = self.circle_s if angle_rad > math.pi else self.quarter_s
@@ -59,6 +60,6 @@ class TurnTable:
             omega_b[:, axis] += angle_rad / lasts_s * (1.0 - np.cos(2.0 * np.pi * gone))
             euler = [0.0 * t_s] * 3
             euler[axis] = turned_rad
-            R_eb = R_eb @ rotation_from_euler(*euler)
+            R_eb = R_eb @ from_euler(*euler)
             start_s += lasts_s
         return Kinematics(R_eb, omega_b, still - np.array([0.0, 0.0, self.height_m]), still, still)

@@ -17,7 +17,7 @@ from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams
 from sim.sensors.device import carry, filter_noise, read_axis, shake, step_filter
-from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Output, Source, require, require_converter, require_device
+from sim.sensors.noise import Output, Source, require, require_converter, require_device
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ NOISE = (("force_bias_b_m_s2", "f8", (3,)), ("force_noise_b_m_s2", "f8", (3,)))
 
 def _figures(params: AccelerometerParams, board: BoardParams) -> device.Figures:
     return device.Figures(
-        "accelerometer", STANDARD_GRAVITY_M_S2, (NOISE[0][0], NOISE[1][0]), full_scale=params.range_g,
+        "accelerometer", G_M_S2, (NOISE[0][0], NOISE[1][0]), full_scale=params.range_g,
         step=params.step_g, null=params.null_g, vibration=board.vibration_g,
         density_sqrt_hz=1e-6 * params.noise_density_ug_sqrt_hz, bias=params.bias_g,
         bias_per_k=1e-3 * params.bias_per_k_mg, drift_per_s=0.0, instability=1e-6 * params.bias_instability_ug,

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 from sim import place
 from sim.clock import Rates
 from sim.sensors.noise import (
-    STANDARD_GRAVITY_M_S2,
     Source,
     gauss_markov,
     lag_weights,
@@ -40,7 +40,7 @@ PRESSURE_PA: Final = 101325.0
 TEMPERATURE_K: Final = 288.15
 LAPSE_K_M: Final = 0.0065
 GAS_CONSTANT_J_KG_K: Final = 287.05287
-_EXPONENT: Final = STANDARD_GRAVITY_M_S2 / (GAS_CONSTANT_J_KG_K * LAPSE_K_M)
+_EXPONENT: Final = G_M_S2 / (GAS_CONSTANT_J_KG_K * LAPSE_K_M)
 
 
 @dataclass(frozen=True, slots=True)

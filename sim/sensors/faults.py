@@ -30,12 +30,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import kernel
-from estimator.interface import Array
+from estimator.interface import G_M_S2, Array
 from sim import params
 from sim.clock import Rates
 from sim.sensors.air_data import height_at_m
 from sim.sensors.device import quantise
-from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Source
+from sim.sensors.noise import Source
 from sim.sensors.receiver import hold
 
 LATEST_S: Final = 36000.0
@@ -70,7 +70,7 @@ class _Part(NamedTuple):
 _GYRO, _ACCELEROMETER, _MAGNETOMETER, _AIRSPEED, _BAROMETER, _GPS = range(6)
 _PARTS: Final = {
     "gyro": _Part(_GYRO, "deg/s", math.radians(1.0), 3, 5.0, (200.0, 0.02)),
-    "accelerometer": _Part(_ACCELEROMETER, "g", STANDARD_GRAVITY_M_S2, 3, 0.2, (2.0, 0.02)),
+    "accelerometer": _Part(_ACCELEROMETER, "g", G_M_S2, 3, 0.2, (2.0, 0.02)),
     "magnetometer": _Part(_MAGNETOMETER, "uT", 1.0, 3, 10.0, (50.0, 0.1)),
     "airspeed": _Part(_AIRSPEED, "m/s", 1.0, 1, 3.0, (10.0, 0.1)),
     "barometer": _Part(_BAROMETER, "m", 1.0, 1, 10.0, (50.0, 0.1)),

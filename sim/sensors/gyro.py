@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams
 from sim.sensors.device import carry, filter_noise, rate_shape, read_axis, shake, step_filter
-from sim.sensors.noise import STANDARD_GRAVITY_M_S2, Output, Source, require, require_converter, require_device
+from sim.sensors.noise import Output, Source, require, require_converter, require_device
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,7 @@ def make(params: GyroParams, board: BoardParams, rates: Rates, source: Source, u
     """Make one gyro: draw the errors it keeps for life into `unit`, shape (1,) of UNIT."""
     device.make(_figures(params, board), params, board, rates, source, unit)
     if params.g_sensitivity_deg_s_g:
-        sigma = math.radians(params.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2
+        sigma = math.radians(params.g_sensitivity_deg_s_g) / G_M_S2
         G = sigma * source("gyro g-sensitivity").standard_normal((3, 3))
         unit["leans"], unit["g_sensitivity"] = 1, G @ device.axes(board.mounting_deg)
         unit["off_centre"] = any(board.lever_arm_b_m)

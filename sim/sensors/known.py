@@ -7,6 +7,7 @@ cannot distinguish are combined into one figure, their root sum of squares.
 import math
 
 from estimator.instruments import Known
+from estimator.interface import G_M_S2
 from sim.clock import Rates
 from sim.sensors.accelerometer import AccelerometerParams
 from sim.sensors.board import BoardParams
@@ -14,7 +15,6 @@ from sim.sensors.device import converter, noise_filter, noise_of_one_conversion
 from sim.sensors.fitting import SuiteParams
 from sim.sensors.gps import KNOT_M_S, GpsParams
 from sim.sensors.gyro import GyroParams
-from sim.sensors.noise import STANDARD_GRAVITY_M_S2
 
 UNIFORM = math.sqrt(12.0)  # step / standard deviation of a value uniform over one step
 NMEA_SPEED_STEP_M_S, UBX_SPEED_STEP_M_S = 0.01 * KNOT_M_S, 0.001
@@ -92,9 +92,9 @@ def _accelerometer(part: AccelerometerParams, board: BoardParams, rates: Rates) 
     noise = _density(part, 1e-6 * part.noise_density_ug_sqrt_hz, part.step_g, part.range_g, rates)
     biases_g = part.bias_g, 1e-3 * part.bias_per_k_mg * board.warming_k, part.gain, part.cross_axis
     return {
-        "force_full_scale_m_s2": part.range_g * STANDARD_GRAVITY_M_S2,
-        "force_noise_m_s2_sqrt_hz": noise * STANDARD_GRAVITY_M_S2,
-        "force_bias_sigma_m_s2": math.hypot(*biases_g, _mounting_rad(board)) * STANDARD_GRAVITY_M_S2,
+        "force_full_scale_m_s2": part.range_g * G_M_S2,
+        "force_noise_m_s2_sqrt_hz": noise * G_M_S2,
+        "force_bias_sigma_m_s2": math.hypot(*biases_g, _mounting_rad(board)) * G_M_S2,
     }
 
 

@@ -23,7 +23,6 @@ from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.params import unit_of
 
-STANDARD_GRAVITY_M_S2: Final = 9.80665  # 1 g in data sheets
 MOST_BITS: Final = 24
 MOST_CONVERSIONS: Final = 1000
 

@@ -12,12 +12,13 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from estimator.interface import Array
+from estimator.interface import G_M_S2, Array
+from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.log import Log, Phase
 from sim.loop import sense
 from sim.magnetic_field import field_e_ut
-from sim.motion.prescribed_plant import CALM, Kinematics, Motion, PrescribedPlant, rotation_from_euler
+from sim.motion.prescribed_plant import CALM, Kinematics, Motion, PrescribedPlant
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
 from sim.rng import stream
 from sim.sensors import accelerometer, allan, gyro
@@ -26,7 +27,6 @@ from sim.sensors.datasheet import PERFECT
 from sim.sensors.device import noise_filter
 from sim.sensors.gps import GpsParams
 from sim.sensors.magnetometer import MagnetometerParams
-from sim.sensors.noise import STANDARD_GRAVITY_M_S2
 from sim.sensors.suite import Suite, SuiteParams
 
 FLIGHTS: Final = 22  # of three axes: 66 hours at rest; the mean curve has an eighth of the scatter of one
@@ -61,7 +61,7 @@ INERTIAL: Final = {
         "noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s",
     ),
     "accelerometer": Inertial(
-        accelerometer, "ug", 1e6 / STANDARD_GRAVITY_M_S2, ("force_bias_b_m_s2", "force_noise_b_m_s2"),
+        accelerometer, "ug", 1e6 / G_M_S2, ("force_bias_b_m_s2", "force_noise_b_m_s2"),
         "noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s",
     ),
 }  # fmt: skip
@@ -189,7 +189,7 @@ class Exercise:
     Each change of rate and force is a sine squared.
     """
 
-    pull_m_s2: float = 1.5 * STANDARD_GRAVITY_M_S2
+    pull_m_s2: float = 1.5 * G_M_S2
     roll_rad_s: float = math.radians(120.0)
     phase: ClassVar[Phase] = Phase.FLYING
     wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
@@ -202,7 +202,7 @@ class Exercise:
         back, angle_back, _ = _pulse(t_s - 4.5)
         still = np.zeros_like(t_s)
         return Kinematics(
-            rotation_from_euler(self.roll_rad_s * (angle_out - angle_back), still, still),
+            from_euler(self.roll_rad_s * (angle_out - angle_back), still, still),
             np.stack([self.roll_rad_s * (out - back), still, still], axis=1),
             np.stack([12.0 * t_s, still, -60.0 - self.pull_m_s2 * p], axis=1),
             np.stack([still + 12.0, still, -self.pull_m_s2 * v], axis=1),
@@ -260,7 +260,7 @@ def _level(north: Array, east: Array, speed: Array | float, course: Array, rate:
     """Level motion, wings level, nose along the course."""
     still, sine, cosine = np.zeros_like(north), np.sin(course), np.cos(course)
     return Kinematics(
-        rotation_from_euler(still, still, course),
+        from_euler(still, still, course),
         np.stack([still, still, rate], axis=1),
         np.stack([north, east, still - 60.0], axis=1),
         np.stack([speed * cosine, speed * sine, still], axis=1),
@@ -412,7 +412,7 @@ class Surge:
         w = 2.0 * math.pi / 20.0
         sine, cosine, still = np.sin(w * t_s), np.cos(w * t_s), np.zeros_like(t_s)
         return Kinematics(
-            rotation_from_euler(still, still, still),
+            from_euler(still, still, still),
             np.stack([still, still, still], axis=1),
             np.stack([12.0 * t_s - 5.0 / w * cosine, still, -60.0 + 10.0 * cosine], axis=1),
             np.stack([12.0 + 5.0 * sine, still, -10.0 * w * sine], axis=1),

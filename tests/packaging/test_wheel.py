@@ -14,7 +14,7 @@ import pytest
 from scenarios.harness.registry import registered
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
+PACKAGES = ("estimator", "autopilot", "sim", "scenarios", "wingslevel")
 DATA = (".xml", ".toml", ".md", ".obj", ".glb")
 
 
@@ -71,7 +71,7 @@ def test_wheel_contains_every_source_and_data_file(wheel: Path) -> None:
         path.relative_to(ROOT).as_posix()
         for package in PACKAGES
         for path in (ROOT / package).rglob("*")
-        if path.suffix in (".py", *DATA) and "__pycache__" not in path.parts
+        if (path.suffix in (".py", *DATA) or path.name == "py.typed") and "__pycache__" not in path.parts
     }
     assert names == expected
     assert any(name.endswith(".xml") for name in names)
@@ -80,7 +80,7 @@ def test_wheel_contains_every_source_and_data_file(wheel: Path) -> None:
 
 
 def test_wheel_installed_is_what_runs(installed: Path, tmp_path: Path) -> None:
-    """The four packages come from the wheel; the checkout is nowhere on the path."""
+    """The five packages come from the wheel; the checkout is nowhere on the path."""
     names = ", ".join(PACKAGES)
     code = f"import {names}, json, sys; print(json.dumps([[p.__file__ for p in ({names})], sys.path]))"
     done = call([str(installed / "python"), "-c", code], tmp_path)

@@ -12,11 +12,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.ins_ekf import InsEkf, InsEkfParams
+from estimator.interface import G_M_S2
+from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.log import Log, Phase
-from sim.motion.prescribed_plant import GRAVITY_M_S2, Kinematics, motion_rows, rotation_from_euler
+from sim.motion.prescribed_plant import GRAVITY_M_S2, Kinematics, motion_rows
 from sim.place import LATITUDE_DEG
-from sim.sensors.noise import STANDARD_GRAVITY_M_S2
 from sim.sensors.suite import SUITES, Suite
 
 N_FLIGHTS, DURATION_S, SETTLED_S = 16, 70.0, 15.0
@@ -25,7 +26,7 @@ ASSUMED_S, LATENCY_SIGMA_S = 0.3, 0.1
 ASSUMED = InsEkfParams(
     gps_filter_s=GENERIC.gps.filter_s, gps_stamped=False, gps_latency_s=ASSUMED_S, gps_latency_sigma_s=LATENCY_SIGMA_S,
     gyro_full_scale_rad_s=math.radians(GENERIC.gyro.range_deg_s),
-    force_full_scale_m_s2=GENERIC.accelerometer.range_g * STANDARD_GRAVITY_M_S2,
+    force_full_scale_m_s2=GENERIC.accelerometer.range_g * G_M_S2,
 )  # fmt: skip
 LATE_S = 0.0075  # a fix arrives in the tick of 0.02 s that its latency ends in: later by 0 to 3 steps of 0.005 s
 
@@ -61,7 +62,7 @@ class Weaving:
         along = np.stack([np.cos(chi), np.sin(chi), still], axis=-1)
         across = np.stack([-np.sin(chi), np.cos(chi), still], axis=-1)
         return Kinematics(
-            rotation_from_euler(roll, 0.0, yaw),
+            from_euler(roll, 0.0, yaw),
             np.stack([droll, dyaw * np.sin(roll), dyaw * np.cos(roll)], axis=-1),
             np.zeros((len(t_s), 3)),
             V * along + np.array(self.wind_e_m_s),

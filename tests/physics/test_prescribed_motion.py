@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
+from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.log import Log
 from sim.motion.hover import Hover
@@ -20,7 +21,6 @@ from sim.motion.prescribed_plant import (
     Rest,
     SteadyTurn,
     StraightLevel,
-    rotation_from_euler,
 )
 from sim.motion.turn_table import TurnTable
 from sim.place import LATITUDE_DEG
@@ -53,12 +53,12 @@ def flown(motion, n_ticks=200, rates=None, latitude_deg=LATITUDE_DEG):
     return log.truth
 
 
-def test_rotation_from_euler_any_angles_agrees_with_scipy():
+def test_from_euler_any_angles_agrees_with_scipy():
     """The Euler composition is SciPy's intrinsic yaw, pitch, roll."""
     roll, pitch, yaw = np.random.default_rng(1).uniform(-np.pi, np.pi, (3, 500))
     expected = Rotation.from_euler("ZYX", np.stack([yaw, pitch, roll], axis=-1)).as_matrix()
     # Round-off: a handful of products of sines.
-    np.testing.assert_allclose(rotation_from_euler(roll, pitch, yaw), expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(from_euler(roll, pitch, yaw), expected, rtol=0, atol=1e-14)
 
 
 @moving

@@ -8,13 +8,13 @@ import pytest
 from estimator.blocks.magnetometer import Calibration
 from estimator.gps_velocity import GpsVelocityMagnetometer, GpsVelocityParams
 from estimator.interface import MEASURED_DTYPE
-from estimator.rotation import heading_rad
+from estimator.rotation import from_euler, heading_rad
 from scenarios.harness.config import FlightConfig, override
 from scenarios.harness.flight import prepare_config
 from scenarios.harness.registry import find
 from sim import place
 from sim.magnetic_field import field_e_ut
-from sim.motion.prescribed_plant import GRAVITY_M_S2, rotation_from_euler
+from sim.motion.prescribed_plant import GRAVITY_M_S2
 
 FIELD = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, place.YEAR)
 HARD_IRON = (6.0, -10.0, 8.0)
@@ -74,7 +74,7 @@ def test_turning_a_magnetometer_that_is_not_fitted_is_refused():
 
 def estimated_heading_error(heading, hard_iron_b_ut, **params):
     """Heading error [rad] of `gps_velocity_magnetometer` after 400 s level at rest under a field with hard iron."""
-    R = rotation_from_euler(0.0, 0.0, np.array([heading]))[0]
+    R = from_euler(0.0, 0.0, np.array([heading]))[0]
     rows = np.zeros(20_000, MEASURED_DTYPE)
     rows["t_s"], rows["dt_s"] = 0.02 * np.arange(1, 20_001), 0.02
     rows["force_b_m_s2"] = (0.0, 0.0, -GRAVITY_M_S2)

@@ -23,8 +23,7 @@ from autopilot.energy import (
     want_airspeed,
 )
 from autopilot.interface import Mode, Setpoint
-from autopilot.stabilise import G_M_S2
-from estimator.interface import MEASURED_DTYPE
+from estimator.interface import G_M_S2, MEASURED_DTYPE
 
 PARAMS = EnergyParams()
 CRUISE_M_S, DT_S = PARAMS.airspeed_m_s, 0.02

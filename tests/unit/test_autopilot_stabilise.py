@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 
 from autopilot.dcm import _PARAMS
 from autopilot.stabilise import (
-    G_M_S2,
     StabiliseParams,
     extra_lift,
     rate_control,
@@ -20,6 +19,7 @@ from autopilot.stabilise import (
     shorter_way,
     turn_rate,
 )
+from estimator.interface import G_M_S2
 
 ROUND_OFF = 1e-12  # a dozen products of numbers up to a few units
 PARAMS = StabiliseParams()

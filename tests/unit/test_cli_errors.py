@@ -185,7 +185,22 @@ def test_completion_of_a_name_is_what_begins_so(complete: Callable, typed: str, 
 def test_completion_imports_nothing_heavy() -> None:
     """A key was pressed, and somebody waits."""
     code = (
-        "import sys; from scenarios.harness import cli, cli_values; cli_values.scenarios(''); cli_values.claims('');"
+        "import sys; from scenarios.harness.cli import app, values; values.scenarios(''); values.claims('');"
         "print([m for m in ('numpy', 'numba', 'jsbsim', 'pyarrow', 'rich') if m in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["check", "--help"], ["list"]])
+def test_reader_that_closes_the_pipe_is_no_error(arguments: list[str]) -> None:
+    """As with ``| head -1``: nothing on standard error, exit code 0."""
+    code = "import sys; from scenarios.harness.gate.guard import main; main()"
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments], stdout=write, stderr=subprocess.PIPE, text=True, check=False
+        )
+    finally:
+        os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")

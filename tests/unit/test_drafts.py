@@ -18,7 +18,7 @@ from sim.outside.drafts import hidden, new_folder, probe, sweep
 def dead():
     """The mark of a process that has ended."""
     code = "from estimator.compiler import owner; print(owner.mark())"
-    root = Path(owner.__file__).parents[1]
+    root = Path(owner.__file__).parents[2]
     return subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True).stdout[
         :-1
     ]

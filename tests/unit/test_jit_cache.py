@@ -15,7 +15,7 @@ import estimator.compiler.jit
 from estimator.compiler import compiling, kernel_cache, owner
 from estimator.compiler.sources import ROOT, Sources, imported
 
-PARTS = ("jit", "kernel_cache", "sources", "compiling", "owner")
+PARTS = ("__init__", "jit", "kernel_cache", "sources", "compiling", "owner")
 CALLER = """
 from estimator.compiler.jit import kernel
 from estimator.callee import (  # (the callee)
@@ -50,11 +50,11 @@ print({kernel}(2.0), sum({kernel}.stats.cache_hits.values()))
 def tree(tmp_path):
     """A package of three tiny kernels, one calling another, around the real cache."""
     package = tmp_path / "estimator"
-    package.mkdir()
+    (package / "compiler").mkdir(parents=True)
     (package / "__init__.py").touch()
     for part in PARTS:
         text = Path(estimator.compiler.jit.__file__).with_name(f"{part}.py").read_text()
-        (package / f"{part}.py").write_text(text)
+        (package / "compiler" / f"{part}.py").write_text(text)
     (package / "caller.py").write_text(CALLER)
     (package / "callee.py").write_text(CALLEE.format(factor=3.0))
     (package / "apart.py").write_text(APART)

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
-from estimator.interface import MEASURED_DTYPE, AirData, GpsFix, Health, ImuSample, Measurements
-from estimator.premerlani import AIR_LIFE_S, G_M_S2, Premerlani, PremerlaniParams
+from estimator.interface import G_M_S2, MEASURED_DTYPE, AirData, GpsFix, Health, ImuSample, Measurements
+from estimator.premerlani import AIR_LIFE_S, Premerlani, PremerlaniParams
 from estimator.rotation import heading_error_rad, inclination_error_rad
 
 DT, SPEED = 0.02, 12.6

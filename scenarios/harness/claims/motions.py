@@ -9,8 +9,7 @@ import numpy as np
 
 from autopilot.interface import NEUTRAL
 from estimator.blocks.magnetometer import Calibration
-from estimator.blocks.screening import G_M_S2
-from estimator.interface import Array, ImuSample
+from estimator.interface import G_M_S2, Array, ImuSample
 from estimator.rotation import inclination_error_rad
 from sim import place
 from sim.clock import Rates

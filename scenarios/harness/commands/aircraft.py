@@ -1,4 +1,4 @@
-"""The handbook page of an aeroplane: what it can do and how it moves, computed from its model, printed and as JSON.
+"""The performance page of an aeroplane, computed from its model: what it can do and how it moves.
 
 Performance comes from trims (`sim.aeroplane.performance`), the modes from the model linearised at the cruise
 (`sim.aeroplane.linear`), beside the textbook's formulas for them from the same derivatives
@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from estimator.interface import G_M_S2
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import attempt, check_picture, reporting, usage
 from sim.aeroplane import performance
 from sim.aeroplane.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.aeroplane.jsbsim_model import Model
@@ -20,7 +22,6 @@ from sim.aeroplane.trim import Trim
 
 PHYSICS_HZ = 200
 HEIGHT_M = 60.0
-FORMATS = (".png", ".svg", ".pdf")
 TITLES = {
     "short_period": "short period",
     "phugoid": "phugoid",
@@ -56,7 +57,7 @@ class Handbook:
 
     @property
     def wing_loading_n_m2(self) -> float:
-        return self.frame.mass_kg * 9.80665 / self.frame.area_m2
+        return self.frame.mass_kg * G_M_S2 / self.frame.area_m2
 
     def to_json(self) -> dict[str, Any]:
         """The page as numbers named with their units; None for what does not exist."""
@@ -97,7 +98,7 @@ class Handbook:
 
 
 def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
-    """Compute the page of the aircraft `name`; ValueError where there is no such aircraft."""
+    """Compute the page of the aircraft `name`; ValueError if there is no such aircraft."""
     model = Model(name, PHYSICS_HZ)
     p = performance.measure(model, height_m)
     linear = linearise(model, p.cruise, height_m)
@@ -105,12 +106,6 @@ def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
     simple = lanchester(p.cruise.airspeed_m_s, frame.lift_n / frame.drag_n)
     derivatives = coefficients(linear, frame)
     return Handbook(name, model, frame, p, linear, modes(linear), textbook(linear), simple, derivatives)
-
-
-def check_picture(path: Path | None) -> None:
-    """Refuse, before anything is computed, a picture in a format that cannot be drawn."""
-    if path is not None and path.suffix.lower() not in FORMATS:
-        raise ValueError(f"--picture {path}: end the name in {', '.join(FORMATS)}")
 
 
 def glide_ratio(t: Trim) -> float:
@@ -155,7 +150,7 @@ def _turn_json(t: Trim) -> dict[str, float]:
     }
 
 
-def tell(book: Handbook) -> None:
+def print_report(book: Handbook) -> None:
     """Print the page."""
     out, f = console.out(), book.frame
     loading = f"{10.0 * f.mass_kg / f.area_m2:.1f} g/dm2"
@@ -274,3 +269,18 @@ def _derivatives(book: Handbook) -> Any:
     cells += [("", "")] * (3 * third - len(cells))
     rows = [[*cells[i], *cells[i + third], *cells[i + 2 * third]] for i in range(third)]
     return console.table("Derivatives, per rad and per full deflection", [""] * 6, rows, text=(0, 2, 4))
+
+
+def run(name: str, picture: Path | None, json_: str | None) -> None:
+    """Do what the command line asks for."""
+    with reporting(json_) as report:
+        with usage():
+            check_picture(picture)
+            book = make(name)
+        if picture is not None:
+            from scenarios.harness.commands import aircraft_picture
+
+            with attempt():
+                aircraft_picture.draw(book, picture)
+        report(book.to_json())
+        print_report(book)  # last: a reader who closes the pipe loses no file

@@ -1,4 +1,4 @@
-"""The handbook page as one picture: polar, power, trim, turns, and where the modes go with speed.
+"""The performance page as one picture: polar, power, trim, turns, and where the modes go with speed.
 
 Imported only when a picture is asked for: it brings matplotlib.
 """
@@ -13,14 +13,14 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from estimator.interface import G_M_S2
 from scenarios.harness.cli.reports import write_figure
 from scenarios.harness.commands.aircraft import MODE_HEADINGS, TITLES, Handbook, figures, glide_ratio, mode_rows
+from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
 from sim.aeroplane.linear import Mode, linearise, modes
 from sim.aeroplane.performance import radius_m
 from sim.aeroplane.trim import Trim, trim
 
-INK, FAINT, GRID = "#1f2933", "#7b8794", "#e4e7eb"
-BLUE, ORANGE, GREEN, RED, VIOLET, TEAL = "#2563a8", "#d9730d", "#3a8f4d", "#c0392b", "#7d52a0", "#16858c"
 COLOURS = {
     "short_period": BLUE,
     "phugoid": TEAL,
@@ -29,31 +29,7 @@ COLOURS = {
     "spiral": VIOLET,
     "roll_spiral": VIOLET,
 }
-STYLE: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "text.color": INK,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.8,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "lines.linewidth": 1.8,
-}
 LOCUS_SPEEDS = 13
-DPI = 150
 
 
 def draw(book: Handbook, path: Path) -> None:
@@ -125,7 +101,7 @@ def _polar(ax: Any, book: Handbook) -> None:
 def _power(ax: Any, book: Handbook) -> None:
     """Power to stay level, of the drag with the motor off, and at full throttle; the gap is what climbs."""
     p = book.performance
-    weight_n = book.frame.mass_kg * 9.80665
+    weight_n = book.frame.mass_kg * G_M_S2
     held = [t for t in p.polar if t.alpha_rad <= p.stall.alpha_rad]
     if not p.climbs or p.best_climb is None or p.steepest is None or p.top_speed is None:
         _glide_ratios(ax, book, held)
@@ -265,7 +241,7 @@ def _damping_rays(ax: Any, dampings: Sequence[float]) -> None:
 def _turns(ax: Any, book: Handbook) -> None:
     """Rate of turn against speed: banks, where the wing stalls, and the turns of the page."""
     p = book.performance
-    stall, g = p.stall.airspeed_m_s, 9.80665
+    stall, g = p.stall.airspeed_m_s, G_M_S2
     fast = p.top_speed.airspeed_m_s if p.top_speed else 2.4 * stall
     speeds = np.linspace(stall, 1.02 * fast, 200)
     highest = 0.0

@@ -16,7 +16,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from estimator.interface import Array
 from scenarios.harness.cli.reports import write_figure
-from scenarios.harness.commands.aircraft_picture import (
+from scenarios.harness.commands.comparison import LETTERS, Comparison, Entrant, checks_text
+from scenarios.harness.metrics import Series, p95, rms
+from scenarios.harness.picture_style import (
     BLUE,
     DPI,
     FAINT,
@@ -29,8 +31,6 @@ from scenarios.harness.commands.aircraft_picture import (
     TEAL,
     VIOLET,
 )
-from scenarios.harness.commands.compare import LETTERS, Comparison, Entrant, checks_text
-from scenarios.harness.metrics import Series, p95, rms
 from sim.outside.wording import plotted
 
 COLOURS = (
@@ -45,7 +45,7 @@ MANY = 8  # more lines than these are drawn thin, smoother and without shades
 
 
 def draw(comparison: Comparison, path: Path) -> None:
-    """Draw `comparison` into `path`; its ending says the format.  ValueError where nothing was flown."""
+    """Draw `comparison` into `path`; its ending says the format.  ValueError if nothing was flown."""
     flown = [e for e in comparison.entrants if e.flights]
     if not flown:
         raise ValueError("nothing was flown: there is nothing to draw")
@@ -77,7 +77,7 @@ def _heading(figure: Any, comparison: Comparison, height: float) -> None:
     )
     wind = f"wind {config.air.wind_m_s:g} m/s, turbulence W20 {config.air.turbulence_w20_m_s:g} m/s"
     facts = (
-        plotted(comparison.scenario.told_as, 120),
+        plotted(comparison.scenario.summary, 120),
         f"{n} {'seed' if n == 1 else 'seeds'}, the same for each",
         plotted(config.aircraft.replace("_", " ")),
         f"sensors {plotted(Path(config.suite).stem)}",
@@ -109,7 +109,7 @@ def _binned(series: Sequence[Series], bin_s: float) -> tuple[Array, Array]:
 
 
 def _over_time(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> None:
-    """Median of the seeds, the middle half of them shaded, a cross where a flight ended early."""
+    """Median of the seeds, the middle half of them shaded, a cross if a flight ended early."""
     top, many = 1.0, len(entrants) > MANY
     bin_s = 3.0 * BIN_S if many else BIN_S
     for e in entrants:

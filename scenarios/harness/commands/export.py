@@ -5,11 +5,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import check_file, reporting, usage, write
 from scenarios.harness.commands import export_text
+from scenarios.harness.commands.view import newest
 from sim import gps_messages, recording
 from sim.gps_messages import Accuracy, Fixes
 from sim.log import Flight
@@ -49,7 +52,7 @@ class Export:
 
 
 def parse_start(text: str | None) -> datetime:
-    """A date and time; without a zone it is UTC, as in every message.  ValueError where it is none."""
+    """A date and time; without a zone it is UTC, as in every message.  ValueError if it is none."""
     if text is None:
         return gps_messages.START
     try:
@@ -65,26 +68,25 @@ def make(
     source: Path, nmea: Path | None = None, ubx: Path | None = None, start: datetime = gps_messages.START,
     csv: Path | None = None,
 ) -> Export:  # fmt: skip
-    """Put the recording at `source` (as `view` takes it) into messages and a text log.
+    """The recording at `source` (as `view` takes it) as messages and a text log, see `make_of`."""
+    _require_apart(nmea, ubx, csv)
+    return make_of(recording.load(source.parent if source.suffix == ".rrd" else source), source, nmea, ubx, start, csv)
+
+
+def make_of(
+    flight: Flight, source: Path, nmea: Path | None = None, ubx: Path | None = None,
+    start: datetime = gps_messages.START, csv: Path | None = None,
+) -> Export:  # fmt: skip
+    """`flight`, of the recording at `source`, as messages and a text log.
 
     nmea, ubx, csv : where each will be written      start : UTC at power-up
-    The text log is packed where its name ends with .gz, and its column map is written beside it, as .toml.
+    The text log is compressed if its name ends with .gz; its column map is written beside it, as .toml.
 
     Raises
     ------
-    ValueError      no output requested, no recording there, no fix for the messages, or a missing package
+    ValueError      no output requested, no fix for the messages, or a missing package
     """
-    if nmea is None and ubx is None and csv is None:
-        raise ValueError("nothing to write: name --nmea FILE, --ubx FILE, --csv FILE or several of them")
-    named: dict[Path, str] = {}
-    wanted = {"--nmea": nmea, "--ubx": ubx, "--csv": csv, "the map of --csv": None if csv is None else map_of(csv)}
-    for option, path in wanted.items():
-        if path is None:
-            continue
-        if path.resolve() in named:
-            raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: each needs a file of its own")
-        named[path.resolve()] = option
-    flight = recording.load(source.parent if source.suffix == ".rrd" else source)
+    _require_apart(nmea, ubx, csv)
     with strangers.reading(source):
         fixes = Fixes.from_log(flight.log.measured, accuracy_of(flight))
     if len(fixes) == 0 and (nmea is not None or ubx is not None):
@@ -100,6 +102,20 @@ def make(
         files["CSV"] = csv, gzip.compress(text, mtime=0) if csv.suffix == ".gz" else text
         files["map"] = map_of(csv), export_text.to_map(columns, flight, csv.name).encode()
     return Export(source, fixes, start, files, len(flight.log))
+
+
+def _require_apart(nmea: Path | None, ubx: Path | None, csv: Path | None) -> None:
+    """Require that something is to be written, each in a file of its own: ValueError."""
+    if nmea is None and ubx is None and csv is None:
+        raise ValueError("nothing to write: name --nmea FILE, --ubx FILE, --csv FILE or several of them")
+    named: dict[Path, str] = {}
+    wanted = {"--nmea": nmea, "--ubx": ubx, "--csv": csv, "the map of --csv": None if csv is None else map_of(csv)}
+    for option, path in wanted.items():
+        if path is None:
+            continue
+        if path.resolve() in named:
+            raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: each needs a file of its own")
+        named[path.resolve()] = option
 
 
 def map_of(csv: Path) -> Path:
@@ -127,7 +143,7 @@ def accuracy_of(flight: Flight) -> Accuracy:
     return Accuracy(both_axes_m, vertical_m, math.hypot(gps.velocity_noise_m_s, gps.velocity_wander_m_s))
 
 
-def tell(export: Export) -> None:
+def print_report(export: Export) -> None:
     """Print the table."""
     first_t_s, last_t_s = _span(export.fixes)
     times = ["none" if t is None else f"{export.utc(t):%H:%M:%S.%f}"[:-3] for t in (first_t_s, last_t_s)]
@@ -142,6 +158,27 @@ def tell(export: Export) -> None:
 
 
 def _span(fixes: Fixes) -> tuple[float | None, float | None]:
-    """The first and the last stamp; None where there is none."""
+    """The first and the last stamp; None if there is none."""
     stamps = [float(t) for t in fixes.t_s if math.isfinite(t)]
     return (min(stamps), max(stamps)) if stamps else (None, None)
+
+
+def run(
+    flight: Path | None,
+    below: Path,
+    nmea: Path | None,
+    ubx: Path | None,
+    csv: Path | None,
+    start: str | None,
+    json_: str | None,
+) -> None:
+    """Do what the command line asks for, with `flight` or the newest `below` that folder."""
+    with reporting(json_) as report:
+        with usage():
+            for path in (nmea, ubx, csv, map_of(csv) if csv is not None else None):
+                check_file(path)
+            done = make(flight or newest(below), nmea, ubx, parse_start(start), csv)
+        for path, data in done.files.values():
+            write(path, partial(bytes, data))
+        report(done.to_json())
+        print_report(done)  # last: a reader who closes the pipe loses no file

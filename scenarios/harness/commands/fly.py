@@ -1,4 +1,4 @@
-"""One flight, as the command line flies it: refused early or flown, recorded, judged and told."""
+"""`wingslevel fly`: one flight, flown, recorded, judged and reported."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -7,7 +7,10 @@ from typing import Any
 
 from estimator.instruments import to_json
 from scenarios.harness.cli import console
+from scenarios.harness.cli.options import Changes
+from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.commands import view as viewing
+from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import prepare
 from scenarios.harness.gate import guard
@@ -28,8 +31,8 @@ LATE_SHARE = 0.05  # of the updates; a few are late on any machine that has othe
 class Flown:
     """A flight that was flown, recorded and judged; `shown` live, or not.
 
-    flight, folder : None where the process that flew it is gone, and nothing of it is left;
-    `folder` too where it could not be written
+    flight, folder : None if the process that flew it is gone, and nothing of it is left;
+    `folder` too if it could not be written
     """
 
     scenario: Scenario
@@ -81,6 +84,7 @@ def fly(
     scenario, config = prepared.scenario, prepared.config
     recording.check_writable(into)
     console.warn_of_faults(scenario.name, config)
+    note_ignored(scenario.name, config)
     if _FLIGHT in guard.lost:
         timed_out, message = guard.lost[_FLIGHT]
         outcome = Outcome.TIMED_OUT if timed_out else Outcome.WORKER_DIED
@@ -111,14 +115,14 @@ def fly(
 
 
 def _nothing_of(scenario: Scenario, config: FlightConfig, outcome: Outcome, message: str) -> Flown:
-    """A flight of which nothing is left but how it ended."""
+    """A flight that was lost: only how it ended is known."""
     return Flown(
         scenario, None, FlightVerdict(scenario.name, config.estimator, config.seed, outcome, (), {}, message), None
     )
 
 
 def _warn_if_late(flight: Flight) -> None:
-    """Say that the estimator is too slow for its tick, where it often was."""
+    """Warn if the estimator was often slower than its tick."""
     ticks = len(flight.log)
     if flight.late > LATE_SHARE * ticks:
         console.error(
@@ -127,8 +131,8 @@ def _warn_if_late(flight: Flight) -> None:
         )
 
 
-def tell(flown: Flown) -> None:
-    """The verdict, how the flight ended, and where to see it."""
+def print_report(flown: Flown) -> None:
+    """Print the verdict, how the flight ended, and where to see it."""
     out, flight, judged = console.out(), flown.flight, flown.judged
     if flight is None:
         console.line(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}: {judged.ending}", "bold red")
@@ -152,3 +156,25 @@ def tell(flown: Flown) -> None:
 def _name(scenario: str, config: FlightConfig) -> str:
     """Name of the folder of a recording."""
     return f"{file_name(scenario)}-{file_name(config.estimator.rpartition(':')[2])}-seed{config.seed}"
+
+
+def run(
+    scenario: str,
+    changes: Changes,
+    into: Path,
+    *,
+    rerun: bool,
+    live: bool,
+    web: bool,
+    limit_s: float | None,
+    json_: str | None,
+) -> int:
+    """Do what the command line asks for; gives the exit code."""
+    with reporting(json_) as report:
+        with usage():
+            flown = fly(scenario, changes(), into, rerun=rerun, live=live, web=web, limit_s=limit_s)
+        report(flown.to_json())
+        print_report(flown)  # last: a reader who closes the pipe loses no report
+    if flown.shown is not None:
+        viewing.stay(flown.shown.viewer)
+    return flown.exit_code

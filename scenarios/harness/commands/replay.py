@@ -1,6 +1,6 @@
-"""`wingslevel replay`: a log read, replayed by one estimator or several, recorded and told."""
+"""`wingslevel replay`: a log, replayed with one or more estimators, recorded and reported."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from estimator.instruments import Instruments, property_names, to_json
 from scenarios.harness import logs
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.gate import guard
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.plugins import shared_settings, without
@@ -27,11 +28,11 @@ _SHOWN = (
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """A log and what the estimators made of it.
+class Replays:
+    """A log and the results of the estimators.
 
-    folders : their recordings, by name, None where one could not be written
-    not_judged : why nothing was judged, empty where something was
+    folders : their recordings, by name, None if one could not be written
+    not_judged : why nothing was judged, empty if something was
     notes : what was set for some of the estimators alone, a line each
     """
 
@@ -44,7 +45,7 @@ class Told:
 
     @property
     def exit_code(self) -> int:
-        """1 where an estimator failed, or nothing of the reference could be judged."""
+        """1 if an estimator failed, or nothing of the reference could be judged."""
         nothing = self.log.reference is not None and self.not_judged
         return 1 if nothing or any(r.failure for r in self.replays) else 0
 
@@ -70,7 +71,7 @@ class Told:
         return {**about, "estimators": each, **alone}
 
 
-def run(
+def replay_log(
     path: Path,
     names: Sequence[str],
     into: Path,
@@ -82,7 +83,7 @@ def run(
     withheld: Sequence[str] = (),
     window: Window | None = None,
     rerun: bool = True,
-) -> Told:
+) -> Replays:
     """Read the log at `path`, replay it with each estimator of `names`, record each below the folder `into`.
 
     params : of all that have them, or, as ``premerlani.gps_latency_s``, of one
@@ -101,7 +102,7 @@ def run(
         make(name, of_each[name])
     recording.check_writable(into)
     log = logs.read(path, reference=reference, columns=columns, imu=imu)
-    for name in names:  # again with what the log tells: all are made before any is run
+    for name in names:  # again, with the properties in the log: all are made before any is run
         make(name, of_each[name], known_to(log, withheld))
     replays: list[Replayed] = []
     folders: dict[str, Path | None] = {}
@@ -125,7 +126,7 @@ def run(
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
     notes = (*without(of_each, settings), *_ground_too(log))
-    return Told(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
+    return Replays(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
 
 
 def _place(folder: Path | None) -> str | None:
@@ -133,42 +134,42 @@ def _place(folder: Path | None) -> str | None:
 
 
 def _ground_too(log: RecordedLog) -> list[str]:
-    """A line where the log has fixes and none of them is usable: nothing then tells flight from ground."""
+    """A note if no fix of the log is usable: flight and ground cannot be told apart then."""
     fixes = log.ledger.get("gps")
     if fixes is None or not fixes.read or fixes.used:
         return []
     return ["none of the fixes is usable: all rows are judged, those on the ground too"]
 
 
-def tell(told: Told) -> None:
+def print_report(replays: Replays) -> None:
     """The log, what was repaired in it, the table, and where the recordings are."""
-    out, log = console.out(), told.log
+    out, log = console.out(), replays.log
     length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
     console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}")
     for line in log.notes:
         console.line(f"note        {line}")
     for line in log.repairs:
         console.line(f"repaired    {line}", "yellow")
-    for line in told.notes:
+    for line in replays.notes:
         console.line(f"note        {line}")
     if len(log.ledger):
         columns = ("", "read", "used", "left out")
         out.print(console.table("samples in the log", columns, _books(log), text=(0, 3), wrapping=(3,)))
     if log.reference is not None:
-        console.line(f"against     {log.reference.name}, {told.judged_s:.1f} s of it judged")
-    rows = [_row(replayed) for replayed in told.replays]
+        console.line(f"against     {log.reference.name}, {replays.judged_s:.1f} s of it judged")
+    rows = [_row(replayed) for replayed in replays.replays]
     out.print(console.table("differences from the reference, degrees", _HEADINGS, rows, wrapping=(0,)))
-    console.print_known({replayed.estimator: replayed.known for replayed in told.replays})
-    for replayed in told.replays:
+    console.print_known({replayed.estimator: replayed.known for replayed in replays.replays})
+    for replayed in replays.replays:
         if replayed.refused:
             refused = ", ".join(f"{n} {name}" for name, n in replayed.refused.items())
-            console.line(f"not believed by {replayed.estimator}: {refused} samples")
+            console.line(f"rejected by {replayed.estimator}: {refused} samples")
         if replayed.failure:
             console.line(f"{replayed.estimator} failed: {replayed.failure}", "bold red")
-    if told.not_judged:
+    if replays.not_judged:
         style = "bold red" if log.reference is not None else "yellow"
-        console.line(f"nothing judged: {told.not_judged}", style)
-    for folder in filter(None, told.folders.values()):
+        console.line(f"nothing judged: {replays.not_judged}", style)
+    for folder in filter(None, replays.folders.values()):
         console.line(f"recording   {folder}")
 
 
@@ -184,3 +185,19 @@ def _row(replayed: Replayed) -> list[str]:
     """A line of the table: numbers that belong together in one cell, so that it fits 80 columns."""
     cells = [" ".join(f"{console.number(replayed.scores[name]):>6}" for name in names) for names in _SHOWN]
     return [replayed.estimator, *cells, f"{replayed.ns_per_update:.0f}"]
+
+
+def run(
+    log: Path,
+    names: Callable[[], Sequence[str]],
+    into: Path,
+    json_: str | None,
+    options: Callable[[], Mapping[str, Any]],
+) -> int:
+    """Do what the command line asks for, with the `options` of `replay_log`; gives the exit code."""
+    with reporting(json_) as report:
+        with usage():
+            replays = replay_log(log, names(), into, **options())
+        report(replays.to_json())
+        print_report(replays)  # last: a reader who closes the pipe loses no file
+    return replays.exit_code

@@ -8,10 +8,12 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import attempt, check_picture, refusal, reporting, usage
+from scenarios.harness.commands import sensors
 from scenarios.harness.commands.sensors import Subject
 from sim.params import near_misses
 from sim.sensors.datasheet import KINDS, Part, load_part, part_names, read_text, read_toml
-from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_parts, suite_settings
+from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_names, suite_parts, suite_settings
 
 SHORT: Final = {
     "gyro": "gyro",
@@ -30,15 +32,15 @@ def subject(name: str) -> Subject:
     ------
     ValueError      one line: nothing of that name, with what comes near, or what is wrong in the file
     """
-    suites = {_plain(suite): suite for suite in SUITES}
+    suites = {_plain(suite): suite for suite in suite_names()}
     if _plain(name) in suites:
         return _suite(suites[_plain(name)])
     if name.endswith(".toml"):
         return _suite(name) if _is_suite(name) else _part(load_part(name))
-    known = [*part_names(), *SUITES, "perfect"]
+    known = [*part_names(), *suite_names(), "perfect"]
     if _plain(name) not in map(_plain, known):
         hint = near_misses(name, known)
-        raise ValueError(f"unknown part or suite {name!r}: {hint} (one's own: path/to/part.toml)")
+        raise ValueError(f"unknown part or suite {name!r}: {hint} (your own: path/to/part.toml)")
     return _part(load_part(name))
 
 
@@ -79,7 +81,7 @@ def _part_json(part: Part) -> dict[str, Any]:
     return about | {"sensors": list(part.devices)}
 
 
-def tell() -> None:
+def print_report() -> None:
     """Print the list."""
     out = console.out()
     rows = []
@@ -97,3 +99,27 @@ def tell() -> None:
 
 def _word(kind: str) -> str:
     return "GPS" if kind == "gps" else kind
+
+
+def run(part: str | None, picture: Path | None, json_: str | None) -> None:
+    """Do what the command line asks for: the list, or the page of `part`."""
+    with reporting(json_) as report:
+        if part is None:
+            if picture is not None:
+                raise refusal(f"--picture {picture}: name the part or the suite to draw")
+            report(to_json())
+            print_report()
+            return
+        with usage():
+            check_picture(picture)
+            about = subject(part)
+            sensors.check_rates(about, part)
+        with console.progress("lying still", "axis-hours") as advance:
+            page = sensors.make(about, advance)
+        if picture is not None:
+            from scenarios.harness.commands import sensors_picture
+
+            with attempt():
+                sensors_picture.draw(page, picture)
+        report(page.to_json())
+        sensors.print_report(page)  # last: a reader who closes the pipe loses no file

@@ -14,10 +14,10 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from estimator.interface import Array
+from estimator.interface import G_M_S2, Array
 from scenarios.harness.cli.reports import write_figure
-from scenarios.harness.commands.aircraft_picture import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, VIOLET
 from scenarios.harness.commands.sensors import NAMES, Page
+from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, VIOLET
 from sim.log import Log
 from sim.outside.wording import plotted
 from sim.sensors import allan
@@ -29,7 +29,7 @@ Panel = Callable[[Any], None]
 
 
 def draw(page: Page, path: Path) -> None:
-    """Draw the page into `path`; its ending says the format.  ValueError where it has nothing to draw."""
+    """Draw the page into `path`; its ending says the format.  ValueError if it has nothing to draw."""
     rows = _rows(page)
     if not rows:
         raise ValueError(f"{page.subject.name}: there is nothing to draw of it")
@@ -132,7 +132,7 @@ def _signal(kind: str, log: Log) -> tuple[Array, Array, Array]:
         truth, reading = log.truth["imu_omega_b_rad_s"][:, 0], log.measured["gyro_b_rad_s"][:, 0]
         return t_s, np.degrees(truth), np.degrees(reading)
     truth, reading = log.truth["imu_force_b_m_s2"][:, 2], log.measured["force_b_m_s2"][:, 2]
-    return t_s, -truth / 9.80665, -reading / 9.80665
+    return t_s, -truth / G_M_S2, -reading / G_M_S2
 
 
 def _exercise(ax: Any, kind: str, log: Log) -> None:

@@ -1,8 +1,7 @@
-"""What decides a flight, as a fingerprint: its scenario, its configuration, all code that flies in it, the versions.
+"""A fingerprint of everything that decides a flight: scenario, configuration, flight code and versions.
 
-Code of the project and code of others are read alike: the file that a name stands for, the other Python files of its
-folder (of its whole package, where it is one), and every module of others that these have imported so far.  Data files
-that flight code reads by itself are not seen.
+The project and other code are treated alike: the file behind a name, the other Python files of its folder (or of its
+whole package), and every module that these have imported.  Data files that flight code reads are not covered.
 """
 
 import hashlib
@@ -18,6 +17,8 @@ from types import ModuleType
 from typing import Any
 
 from scenarios.harness.flight import Prepared
+from scenarios.harness.plugins import module_of_offer
+from scenarios.harness.registry import module_of_offer as module_of_scenario
 from sim.recording import versions
 
 _ROOT = Path(__file__).resolve().parents[3]
@@ -31,10 +32,10 @@ def decided_by(named: str, prepared: Prepared) -> dict[str, Any]:
     config = prepared.config
     return {
         "scenario": prepared.scenario.name,
-        "scenario_file": _of_file(Path(named)) if named.endswith(".py") else "",
+        "scenario_file": _of_scenario(named),
         "config": config.model_dump(mode="json"),
-        "estimator": _of_code(config.estimator, type(prepared.estimator.code).__module__),
-        "autopilot": _of_code(config.autopilot, type(prepared.autopilot.code).__module__),
+        "estimator": _of_code("estimator", config.estimator, type(prepared.estimator.code).__module__),
+        "autopilot": _of_code("autopilot", config.autopilot, type(prepared.autopilot.code).__module__),
         "wingslevel": _ours(),
         "versions": _versions(),
     }
@@ -64,12 +65,20 @@ def _ours() -> str:
     return _hash(files, _ROOT)
 
 
-def _of_code(spec: str, module: str) -> str:
+def _of_scenario(named: str) -> str:
+    """The code of others that the scenario `named` is in, empty where it is of the project."""
+    return _of_file(Path(named)) if named.endswith(".py") else _of_others(module_of_scenario(named))
+
+
+def _of_code(word: str, spec: str, module: str) -> str:
     """The code of others behind `spec`, whose class is of `module`; empty where it is all of the project."""
-    place = spec.rpartition(":")[0]
-    if place.endswith(".py"):
-        return _of_file(Path(place))
-    found = {name for name in (place, module) if name in sys.modules and _is_others(sys.modules[name])}
+    place = spec.rpartition(":")[0] or module_of_offer(word, spec)
+    return _of_file(Path(place)) if place.endswith(".py") else _of_others(place, module)
+
+
+def _of_others(*modules: str) -> str:
+    """Those of the imported `modules` that are of others; empty where none is."""
+    found = {name for name in modules if name in sys.modules and _is_others(sys.modules[name])}
     return _of_modules(frozenset(found)) if found else ""
 
 
@@ -131,7 +140,7 @@ def _file_of(module: ModuleType) -> Path | None:
 
 
 def _hash(files: Iterable[Path], root: Path | None) -> str:
-    """Over the names, below `root` where there is one, and the contents of `files`."""
+    """Over the names, below `root` if there is one, and the contents of `files`."""
     digest = hashlib.sha256()
     for path in sorted(set(files)):
         name = path.relative_to(root).as_posix() if root is not None else path.name

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.blocks.screening import G_M_S2, GYRO_RANGE_RAD_S, LONGEST_GAP_S
-from estimator.interface import Array
+from estimator.blocks.screening import GYRO_RANGE_RAD_S, LONGEST_GAP_S
+from estimator.interface import G_M_S2, Array
 from scenarios.harness.logs import accounts, gaps
 from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED, ZEROS
 from scenarios.harness.logs.ledger import Ledger

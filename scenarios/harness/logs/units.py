@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from estimator.blocks.screening import G_M_S2
+from estimator.interface import G_M_S2
 
 _DEG, KN_M_S, FT_M, MI_M = np.pi / 180.0, 1852.0 / 3600.0, 0.3048, 1609.344
 COUNTS = ("count", "counts", "lsb", "raw", "adc", "digit", "digits")  # no unit: what one of them is, only a factor says

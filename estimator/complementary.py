@@ -1,0 +1,187 @@
+"""A complementary filter on the rotation matrix: the estimator to copy for your own.
+
+Gyros are good in the short term, gravity and the GPS course in the long term.  Each sample turns the matrix by the
+gyros, plus a small correction towards the two references:
+
+* gravity, in body axes, is ``omega x v - f``: the specific force less the centrifugal acceleration of a turn, with the
+  speed v of the last fix along the nose;
+* the heading is the GPS course, turned on by what the aeroplane has turned since the fix was true.
+
+The same tilt error, integrated, is the gyro bias.  `step` is the whole algorithm; the class below it only holds the
+parameters and the state.  Copy this file, change `step`, and fly it::
+
+    wingslevel fly crosswind --estimator my_filter.py:Complementary --set heading_s=4
+
+It is the filter of Mahony et al. with the centrifugal term and the course of Premerlani and Bizard.
+
+References
+----------
+R. Mahony, T. Hamel and J.-M. Pflimlin, "Nonlinear complementary filters on the special orthogonal group", 2008.
+W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
+"""
+
+import math
+from dataclasses import asdict, dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
+from estimator.blocks.kernels import clip
+from estimator.blocks.screening import (
+    FORCE_GOOD,
+    FORCE_RANGE_M_S2,
+    GPS,
+    GYRO_RANGE_RAD_S,
+    SCREEN,
+    attitude_at_rest,
+    offset_at_rest,
+    refuse,
+    screen,
+    take_rate,
+)
+from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.rotation import integrate
+
+MIN_SPEED_M_S = 3.0  # a slower course says nothing about the heading
+FIX_LIFE_S = 2.0  # nor does an older one
+FASTEST_M_S = 1000.0  # a fix beyond it is no measurement
+MAX_BIAS_RAD_S = math.radians(45.0)  # whatever the accelerometer says, no gyro is further off
+GRAVITY_BAND_M_S2 = 3.0  # further from g, the force is a throw or a pull-up, not gravity
+ALIGNED = 0.3  # sine of the heading error below which the heading counts as found
+
+
+@dataclass(frozen=True, slots=True)
+class ComplementaryParams:
+    """What can be tuned: ``--set tilt_s=10``.
+
+    tilt_s : float          s, time constant of the tilt correction.  Raised: smoother, less disturbed by manoeuvres,
+                            slower to recover.  Lowered: recovers sooner, follows accelerations that are not gravity
+    heading_s : float       s, the same for the heading.  Raised: less course noise.  Lowered: heading found sooner
+    bias_s : float          s, time constant of the gyro bias.  Raised: steadier bias.  Lowered: follows a drifting
+                            gyro, overshoots after a large tilt error; keep it above 4 tilt_s
+    gps_latency_s : float   s, age of a fix on arrival; set from the data sheet of the receiver.  Too low or too high:
+                            the heading lags or leads in turns
+    gps_filter_s : float    s, time constant of the receiver's velocity filter; likewise
+    """
+
+    tilt_s: float = 5.0
+    heading_s: float = 2.0
+    bias_s: float = 20.0
+    gps_latency_s: float = 0.3
+    gps_filter_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value, of_receiver = getattr(self, field.name), field.name.startswith("gps_")
+            if not (0.0 <= value < math.inf if of_receiver else 0.0 < value < math.inf):
+                raise ValueError(f"{field.name} is {value} s; it must be {'0 or more' if of_receiver else 'above 0'}")
+
+
+_PARAMS = tuple(Column(field.name, (), "see ComplementaryParams") for field in fields(ComplementaryParams))
+STATE_DTYPE = dtype_of(
+    (
+        *BELIEF,
+        *SCREEN,
+        *_PARAMS,
+        Column("v_e_m_s", (3,), "velocity of the last fix"),
+        Column("fix_age_s", (), "time since it arrived"),
+        Column("aligned", (), "1 once the heading has been near the course", integer=True),
+    )
+)
+
+
+@kernel
+def take_fix(row, s):  # type: ignore[no-untyped-def]
+    """Keep the velocity of a fix that arrived; reject one that cannot be true."""
+    s.fix_age_s += s.dt_s
+    if row.gps_new:
+        v = row.gps_v_e_m_s
+        if abs(v[0]) < FASTEST_M_S and abs(v[1]) < FASTEST_M_S and abs(v[2]) < FASTEST_M_S:  # NaN is not
+            s.v_e_m_s[0], s.v_e_m_s[1], s.v_e_m_s[2], s.fix_age_s = v[0], v[1], v[2], 0.0
+        else:
+            refuse(s, GPS)
+
+
+@kernel
+def tilt_error(f, s):  # type: ignore[no-untyped-def]
+    """The small rotation, in body axes, that brings the estimated down axis to the gravity felt; a tuple of three."""
+    w, v = s.omega_b_rad_s, s.v_e_m_s
+    speed = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    x, y, z = -f[0], w[2] * speed - f[1], -w[1] * speed - f[2]  # omega x (speed, 0, 0) - f
+    if abs(np.sqrt(x * x + y * y + z * z) - G_M_S2) > GRAVITY_BAND_M_S2:
+        return 0.0, 0.0, 0.0
+    a, b, c = s.R_eb[2, 0] / G_M_S2, s.R_eb[2, 1] / G_M_S2, s.R_eb[2, 2] / G_M_S2
+    return y * c - z * b, z * a - x * c, x * b - y * a  # gravity x down
+
+
+@kernel
+def heading_error(s):  # type: ignore[no-untyped-def]
+    """Sine of the angle from the nose to the present course, positive to the right; 1 beyond a right angle."""
+    north, east, w = s.v_e_m_s[0], s.v_e_m_s[1], s.omega_b_rad_s
+    speed = np.sqrt(north * north + east * east)
+    if speed < MIN_SPEED_M_S or s.fix_age_s > FIX_LIFE_S:
+        return 0.0
+    error = (s.R_eb[0, 0] * east - s.R_eb[1, 0] * north) / speed
+    if s.R_eb[0, 0] * north + s.R_eb[1, 0] * east < 0.0:
+        error = 1.0 if error > 0.0 else -1.0
+    turn_rad_s = s.R_eb[2, 0] * w[0] + s.R_eb[2, 1] * w[1] + s.R_eb[2, 2] * w[2]
+    # The aeroplane has gone on turning since the fix was true; the matrix is that of the sample before.
+    error += turn_rad_s * (s.gps_latency_s + s.gps_filter_s + s.fix_age_s - s.dt_s)
+    return clip(error, -1.0, 1.0)
+
+
+@kernel
+def step(rows, k, state):  # type: ignore[no-untyped-def]
+    """One sample: the whole algorithm; returns the `Health`."""
+    row, s = rows[k], state[0]
+    good = screen(row, s)  # which of this sample can be believed
+    if not good:
+        return 2  # no time has passed
+    take_rate(row, s, good)  # omega_b_rad_s = gyro - bias
+    take_fix(row, s)
+    x, y, z = tilt_error(row.force_b_m_s2, s) if good & FORCE_GOOD else (0.0, 0.0, 0.0)
+    yaw = heading_error(s)
+    s.aligned |= s.fix_age_s < FIX_LIFE_S and 0.0 < abs(yaw) < ALIGNED
+    w, down, pull, turn = s.omega_b_rad_s, s.R_eb[2], 1.0 / s.tilt_s, yaw / s.heading_s
+    corrected = w[0] + pull * x + turn * down[0], w[1] + pull * y + turn * down[1], w[2] + pull * z + turn * down[2]
+    integrate(s.R_eb, corrected, s.dt_s)
+    learn = s.dt_s / (s.tilt_s * s.bias_s)
+    for i, tilt in enumerate((x, y, z)):
+        s.gyro_bias_b_rad_s[i] = clip(s.gyro_bias_b_rad_s[i] - learn * tilt, -MAX_BIAS_RAD_S, MAX_BIAS_RAD_S)
+    if not s.aligned:
+        return 0  # Health.STARTING
+    return 2 if s.spoilt or s.fix_age_s > FIX_LIFE_S else 1  # Health.POOR, Health.GOOD
+
+
+@kernel
+def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
+    for k in range(rows.shape[0]):
+        health = step(rows, k, state)
+        write_estimate(state[0], health, estimates[k])
+
+
+class Complementary(Compiled):
+    """The filter as the loop calls it; `Compiled` has ``update``, ``replay``, ``snapshot`` and the counters."""
+
+    heading_reference: HeadingReference = "course"
+    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps")
+    _step: ClassVar[Any] = staticmethod(step)
+    _replay: ClassVar[Any] = staticmethod(_replay)
+
+    def __init__(self, params: ComplementaryParams | None = None) -> None:
+        super().__init__(STATE_DTYPE)
+        self.params = params or ComplementaryParams()
+        self.reset()
+
+    def reset(self, on_ground: ImuSample | None = None) -> None:
+        """Power up: tilt and gyro bias from the mean sample at rest, or level and zero in the air; heading north."""
+        s = self._state[0]
+        self._state.fill(0)
+        for name, value in asdict(self.params).items():
+            s[name] = value
+        s["gyro_range_rad_s"], s["force_range_m_s2"] = GYRO_RANGE_RAD_S, FORCE_RANGE_M_S2
+        s["fix_age_s"] = math.inf
+        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        s["gyro_bias_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)

@@ -1,0 +1,76 @@
+"""A progress bar for calls that take long: in a terminal or a notebook, and only if wanted."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+Advance = Callable[[float, float], None]  # called with what is done, and the total
+Progress = bool | Advance
+PATIENCE_S = 2.0  # what is over sooner shows no bar
+
+
+@contextmanager
+def progress_of(wanted: Progress, what: str, unit: str) -> Iterator[Advance]:
+    """Gives what is called with what is done of what is to be done, in `unit`.
+
+    wanted : False shows nothing; True shows a bar after two seconds; a function is called instead
+    """
+    if not isinstance(wanted, bool):
+        yield wanted
+    elif not wanted or not _is_watched():
+        yield lambda _done, _total: None
+    else:
+        bar = _Bar(what, unit)
+        try:
+            yield bar
+        finally:
+            bar.close()
+
+
+def _is_watched() -> bool:
+    """Whether somebody sees a bar: in a notebook, or where standard error is a terminal."""
+    return _in_notebook() or (sys.stderr is not None and sys.stderr.isatty())
+
+
+def _in_notebook() -> bool:
+    shell: Any = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return type(shell).__name__ == "ZMQInteractiveShell"
+
+
+class _Bar:
+    """A bar that appears once its patience is over."""
+
+    def __init__(self, what: str, unit: str) -> None:
+        self._what, self._unit, self._began_s = what, unit, time.monotonic()
+        self._bar: Any = None
+        self._task: Any = None
+
+    def __call__(self, done: float, total: float) -> None:
+        if self._bar is None:
+            if time.monotonic() - self._began_s < PATIENCE_S:
+                return
+            self._show()
+        self._bar.update(self._task, completed=done, total=total)
+
+    def _show(self) -> None:
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+        self._bar = Progress(
+            TextColumn(escape(self._what)),
+            BarColumn(),
+            TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {self._unit}"),
+            TimeElapsedColumn(),
+            console=Console(stderr=not _in_notebook()),
+            transient=True,
+        )
+        self._task = self._bar.add_task("", total=1.0)
+        self._bar.start()
+
+    def close(self) -> None:
+        """Take it away."""
+        if self._bar is not None:
+            self._bar.stop()
