@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import kernel
+from estimator.interface import G_M_S2
 from sim.clock import Rates
 from sim.sensors import device
 from sim.sensors.board import BoardParams
