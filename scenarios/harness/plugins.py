@@ -6,6 +6,7 @@ A name is one of
                       ``wingslevel.estimators`` or ``wingslevel.autopilots``
 ``package.module:Class``   anything that can be imported, also from the working directory
 ``path/to/file.py:Class``  a file
+``path/to/library.so``     a shared library, see `scenarios.harness.c_library`: estimators only
 
 The class is called anew for each flight.  Its constructor is given what it asks for by name: ``instruments``, the
 record of what is known of those aboard, or single properties of it, such as ``gps_latency_s``; an autopilot's also
@@ -27,7 +28,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
 from estimator.instruments import Instruments, Known, property_value
-from scenarios.harness.own_files import also_import_from, module_of_file
+from scenarios.harness.own_files import also_import_from, library_named, module_of_file
 from sim.outside.blame import Refused, home_of, place_of, shown, theirs
 from sim.outside.entry_points import Offer, offered
 from sim.outside.wording import class_name, described, printable
@@ -145,6 +146,12 @@ def _params(kind: _Kind, spec: "str | Maker", code: object) -> Any:
             return None
         dotted_fields(params)  # anyone's class: its fields may raise
         return params
+
+
+def short_name(spec: str) -> str:
+    """What reports call an estimator: the name of its class, or of its library."""
+    library = library_named(spec)
+    return library.short_name if library else spec.rpartition(":")[2]
 
 
 def equipped_autopilot(
@@ -370,6 +377,12 @@ def _arguments(kind: _Kind, spec: "str | Maker", maker: Any) -> set[str]:
 def _find(kind: _Kind, spec: str) -> Any:
     """The class (or whatever is called to make one) that `spec` names."""
     named = spec
+    library = library_named(spec) if kind is _ESTIMATOR else None
+    if library is not None:
+        from scenarios.harness.c_library import class_of_library  # loads the machinery that only these need
+
+        with _refusing(kind, spec):
+            return class_of_library(library)
     if spec in kind.registry:
         spec = kind.registry[spec]
     elif ":" not in spec:

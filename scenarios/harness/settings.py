@@ -7,26 +7,23 @@ the name of an estimator, a parameter is set for all that have it.  ``estimator_
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from scenarios.harness import plugins
-from scenarios.harness.plugins import Maker, maker_name, parameters_of
+from scenarios.harness.own_files import library_named
+from scenarios.harness.plugins import Maker, maker_name, parameters_of, short_name
 from sim.outside.wording import brief
 from sim.params import near_misses
 
 PREFIX = "estimator_params."
-_LIBRARIES = (".so", ".dylib", ".dll")
 _WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
 def names_of(spec: str | Maker) -> tuple[str, ...]:
     """What an estimator may be called in front of a parameter; the name to suggest comes first."""
-    named = maker_name(spec).partition("(")[0]
-    _, colon, inside = named.rpartition(":")
-    if not colon:
-        return (Path(named).stem if Path(named).suffix in _LIBRARIES else named,)
-    name = inside.rpartition(".")[2]
+    if isinstance(spec, str) and (":" not in spec or library_named(spec)):
+        return (short_name(spec),)
+    name = maker_name(spec).partition("(")[0].rpartition(":")[2].rpartition(".")[2]
     return tuple(dict.fromkeys((_WORDS.sub("_", name).lower(), name)))
 
 
