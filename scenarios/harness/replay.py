@@ -27,7 +27,7 @@ from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.logs.validity import INTERVALS, LONGEST_S, latest
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import Equipped, PluginError, equipped, heading_reference_of, learnt
+from scenarios.harness.plugins import Equipped, PluginError, equipped, heading_reference_of, learnt, short_name
 from sim.events import events_of
 from sim.flight_code import FlightCodeFailed, blaming, estimate_of, record_estimates
 from sim.log import Event, Flight, Log, Outcome, Phase
@@ -161,7 +161,7 @@ def replay(
     scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
     ns_per_update = math.nan if failure else ns_per_update
     return Replayed(
-        spec.rpartition(":")[2], reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
+        short_name(spec), reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
         said.refused,
     )  # fmt: skip
 
@@ -169,7 +169,7 @@ def replay(
 def gone(spec: str, failure: str) -> Replayed:
     """The result for an estimator that ended the process: no rows, and the failure."""
     scores = dict.fromkeys(SCORES, math.nan)
-    return Replayed(spec.rpartition(":")[2], "course", Log.empty(0), 0, math.nan, None, scores, failure)
+    return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, scores, failure)
 
 
 def known_to(log: RecordedLog, withheld: Sequence[str] = ()) -> Instruments:
