@@ -1,4 +1,4 @@
-"""The page of the scenarios: what each one flies and verifies, its limits, measured values and margins.
+"""The catalogue of the scenarios: what each one flies and verifies, its limits, measured values and margins.
 
 The texts and limits come from the scenarios, the measured values from a verdict that ``check --json`` wrote.  Without a
 verdict the page keeps the values that it holds already.
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from scenarios.harness.checks import Check, Row
-from scenarios.harness.cli.reports import check_file, usage, write
+from scenarios.harness.cli.reports import check_file, refusal, usage, write
 from scenarios.harness.commands import agree
 from scenarios.harness.registry import registered
 from scenarios.harness.scenario import Scenario
@@ -22,16 +22,16 @@ TIGHTEST = 10  # checks in the table of the smallest margins
 
 HEAD = """# Scenarios
 
-{count} scenarios, {variants} of them variants. `wingslevel fly NAME` flies one, `wingslevel check NAME` judges it on the
-seeds 0 to 9. A scenario is a file in [`scenarios/`](../scenarios); [CONTRIBUTING](../CONTRIBUTING.md#a-scenario) shows
-how to write one.
+{count} scenarios, {variants} of them variants. `wingslevel fly NAME` flies one, `wingslevel check NAME` judges it on
+the seeds 0 to 9. A scenario is a file in [`scenarios/`](../scenarios); [CONTRIBUTING](../CONTRIBUTING.md#a-scenario)
+shows how to write one.
 
-A check has a limit for each flight. An RMS has a second one, for the root of the mean square over all flights, which is
-tighter. The tables show, for the estimator of the scenario and the seeds 0 to 9:
+Each check has a limit for every single flight. An RMS has a second, tighter one for all flights together. The tables
+show what the estimator of the scenario achieves on the seeds {seeds}:
 
-- **worst**: the value of the worst flight, held against the limit of a single flight
-- **RMS of all**: the root of the mean square over the flights, held against the limit of all
-- **margin**: how far the value is from its limit, as a share of the limit
+- **worst**: the value of the worst flight, compared with the limit of a single flight
+- **RMS of all**: the root of the mean square over the flights, compared with the limit of all
+- **margin**: the distance from the value to its limit, in per cent of the limit
 
 This page is written by
 
@@ -58,52 +58,69 @@ class Cells(NamedTuple):
 Numbers = Mapping[tuple[str, str], Cells]  # by scenario and check, as the page names it
 
 
-def run(path: Path, verdict: Path | None) -> None:
-    """Write the page to `path`, with the values of `verdict`, or else those that it holds.
+class Found(NamedTuple):
+    """All that was measured, and the seeds that were flown, as ``0-9``."""
+
+    numbers: Numbers
+    seeds: str
+
+
+def run(kind: str | None, names: Sequence[str], path: Path | None, verdict: Path | None) -> None:
+    """Do what the command line asks for: write the page to `path`, with the values of `verdict` or those that it holds.
 
     Raises
     ------
-    TyperException      one line: a file that cannot be read or written, or holds no verdict
+    TyperException      one line: options that do not fit, a file that cannot be read or written, or holds no verdict
     """
+    if kind != "scenarios" or names or path is None:
+        raise refusal("the catalogue is of all scenarios: wingslevel list scenarios --markdown FILE [--verdict FILE]")
     with usage():
         check_file(path)
         if verdict is not None:
-            numbers = numbers_of(agree.read(verdict))
+            found = measured_by(agree.read(verdict))
         else:
-            numbers = numbers_in(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    write(path, lambda: page(registered(), numbers))
+            found = measured_in(path.read_text(encoding="utf-8") if path.is_file() else "")
+    write(path, lambda: page(registered(), found))
 
 
-def numbers_of(verdict: Mapping[str, Any]) -> dict[tuple[str, str], Cells]:
-    """The cells of every check in a verdict, as `agree.read` returns it: of the scenario's own estimator alone."""
-    pooled = {(p["scenario"], p["estimator"]): p for p in verdict.get("pooled", ())}
-    flights: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for flight in verdict["flights"]:
-        flights.setdefault((flight["scenario"], flight["estimator"]), []).append(flight)
-    found = {}
+def measured_by(verdict: Mapping[str, Any]) -> Found:
+    """What a verdict holds, as `agree.read` returns it, of the scenarios flown with their own estimators."""
+    numbers = {}
     for name, scenario in registered().items():
-        which = (name, scenario.config.estimator)
-        if which not in pooled or which not in flights:
-            continue
-        for i, check in enumerate(scenario.checks):
-            rows = [Row.from_json(flight["checks"][i]) for flight in flights[which]]
-            found[name, markdown(check.name)] = _cells(check, rows, Row.from_json(pooled[which]["checks"][i]))
-    return found
+        flights, pooled = (
+            [e for e in verdict.get(key, ()) if (e["scenario"], e["estimator"]) == (name, scenario.config.estimator)]
+            for key in ("flights", "pooled")
+        )
+        for check in scenario.checks:
+            rows, of_all = (_rows_of(check.name, entries) for entries in (flights, pooled))
+            if rows:
+                numbers[name, markdown(check.name)] = _cells(check, rows, of_all, len(flights))
+    return Found(numbers, _ranges(sorted({flight["seed"] for flight in verdict["flights"]})))
 
 
-def _cells(check: Check, rows: Sequence[Row], pooled: Row) -> Cells:
+def _rows_of(check: str, entries: Sequence[Mapping[str, Any]]) -> list[Row]:
+    return [Row.from_json(row) for entry in entries for row in entry["checks"] if row["name"] == check]
+
+
+def _ranges(seeds: Sequence[int]) -> str:
+    """Seeds in increasing order as ``--seeds`` takes them: ``0-9,12``."""
+    runs: list[list[int]] = []
+    for seed in seeds:
+        if runs and seed == runs[-1][-1] + 1:
+            runs[-1].append(seed)
+        else:
+            runs.append([seed])
+    return ",".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
+
+
+def _cells(check: Check, rows: Sequence[Row], pooled: Sequence[Row], n_flights: int) -> Cells:
     if check.pooled == "count":
-        return Cells(f"{pooled.figure} of {len(rows)} flights")
-    worst = (max if check.sense == "<=" else min)(rows, key=lambda row: _least_first(row, check))
-    first = (_figure(worst), _margin(worst))
-    return Cells(*first, _figure(pooled), _margin(pooled)) if check.pooled == "rms" else Cells(*first)
-
-
-def _least_first(row: Row, check: Check) -> float:
-    """The measured value, by which the worst row is found; one that was not measured is worse than any."""
-    if math.isfinite(row.measured):
-        return row.measured
-    return math.inf if check.sense == "<=" else -math.inf
+        return Cells(f"{sum(row.passed for row in rows)} of {n_flights} flights")
+    missing = [row for row in rows if not math.isfinite(row.measured)]
+    sign = 1.0 if check.sense == "<=" else -1.0
+    worst = missing[0] if missing else max(rows, key=lambda row: sign * row.measured)
+    of_all = [text for row in pooled if check.pooled == "rms" for text in (_figure(row), _margin(row))]
+    return Cells(_figure(worst), _margin(worst), *of_all[:2])
 
 
 def _figure(row: Row) -> str:
@@ -117,23 +134,28 @@ def _margin(row: Row) -> str:
     return f"{100.0 * spare / abs(row.limit):.0f} %"
 
 
-def numbers_in(page: str) -> dict[tuple[str, str], Cells]:
-    """The cells that a page holds."""
+def measured_in(page: str) -> Found:
+    """What a page holds."""
     found, scenario = {}, ""
+    seeds = re.search(r"on the seeds (\S*):$", page, re.MULTILINE)
     for line in page.splitlines():
         if title := re.fullmatch(r"<!-- checks of (\w+) -->", line):
             scenario = title[1]
         elif scenario and line.startswith("| ") and line.count(" | ") == 6 and line != COLUMNS:
             name, _, worst, worst_margin, _, pooled, pooled_margin = line[2:-2].split(" | ")
             found[scenario, name] = Cells(*(c.strip() for c in (worst, worst_margin, pooled, pooled_margin)))
-    return found
+    return Found(found, seeds[1] if seeds else "")
 
 
-def page(scenarios: Mapping[str, Scenario], numbers: Numbers) -> str:
+def page(scenarios: Mapping[str, Scenario], found: Found) -> str:
     """The page as Markdown: all scenarios in a table, the smallest margins, then a section for each file."""
     families = _families(scenarios)
-    variants = len(scenarios) - len(families)
-    lines = [HEAD.format(count=len(scenarios), variants=variants), *_index(families, numbers), *_tightest(numbers)]
+    numbers, variants = found.numbers, len(scenarios) - len(families)
+    lines = [
+        HEAD.format(count=len(scenarios), variants=variants, seeds=found.seeds),
+        *_index(families, numbers),
+        *_tightest(numbers),
+    ]
     for family in families.values():
         lines += _section(family, numbers)
     return "\n".join(lines).rstrip() + "\n"
@@ -143,15 +165,14 @@ def _families(scenarios: Mapping[str, Scenario]) -> dict[str, list[Scenario]]:
     """Each scenario with its variants, which share its name and the rest of its story."""
     families: dict[str, list[Scenario]] = {}
     for name, scenario in scenarios.items():
-        first = next(
-            (f for f, (head, *_) in families.items() if name.startswith(f"{f}_") and _same(head, scenario)), ""
-        )
-        families.setdefault(first or name, []).append(scenario)
+        same = [first for first, (head, *_) in families.items() if _is_variant(scenario, head)]
+        families.setdefault(same[0] if same else name, []).append(scenario)
     return families
 
 
-def _same(a: Scenario, b: Scenario) -> bool:
-    return a.story.splitlines()[1:] == b.story.splitlines()[1:]
+def _is_variant(scenario: Scenario, of: Scenario) -> bool:
+    same_story = scenario.story.strip().splitlines()[1:] == of.story.strip().splitlines()[1:]
+    return scenario.name.startswith(f"{of.name}_") and same_story
 
 
 def _index(families: Mapping[str, Sequence[Scenario]], numbers: Numbers) -> list[str]:
@@ -186,7 +207,7 @@ def _section(family: Sequence[Scenario], numbers: Numbers) -> list[str]:
     lines = [f"## {first.name}", "", f"*{markdown(first.summary)}*", ""]
     lines += [line for label in ("Story", "Verifies") for line in (f"**{label}.** {_sentence(table.pop(label))}", "")]
     lines += [f"| {' | '.join(facts)} |", "|" + "-|" * len(facts), f"| {' | '.join(facts.values())} |", ""]
-    lines += [line for label, text in table.items() for line in (f"**{label}** {text}.", "")]
+    lines += [line for label, text in table.items() for line in (f"**{label}** {_sentence(text)}", "")]
     lines += [line for text in after for line in (text, "")]
     for scenario in family:
         if variants:
@@ -195,12 +216,12 @@ def _section(family: Sequence[Scenario], numbers: Numbers) -> list[str]:
             lines += [f"{markdown(scenario.summary)} Differs by {_changes(first, scenario)}.", ""]
         if scenario.expected_to_fail:
             lines += ["Shows a failure: it passes only if its own estimator fails as the paper predicts.", ""]
-        lines += [f"<!-- checks of {scenario.name} -->", COLUMNS, RULE, *_rows(scenario, numbers), ""]
+        lines += [f"<!-- checks of {scenario.name} -->", "", COLUMNS, RULE, *_rows(scenario, numbers), ""]
     return lines
 
 
 def _sentence(text: str) -> str:
-    return text if text.endswith((".", ")")) else f"{text}."
+    return text if text.endswith(".") else f"{text}."
 
 
 def _rows(scenario: Scenario, numbers: Numbers) -> Iterator[str]:
@@ -234,6 +255,8 @@ def _flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _value(value: Any) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_value(item)}" for name, item in value.items())
     if isinstance(value, list):
         return ", ".join(map(_value, value)) or "none"
     return f"{value:g}" if isinstance(value, float) else markdown(str(value))
@@ -262,4 +285,4 @@ def story_of(story: str) -> tuple[dict[str, str], list[str]]:
 
 def _inline(text: str) -> str:
     """A line of reStructuredText as Markdown."""
-    return " ".join(text.split()).replace("``", "`").replace("|", r"\|")
+    return " ".join(text.split()).replace("``", "`").replace("+-", "±").replace("|", r"\|")
