@@ -1,4 +1,4 @@
-"""The story of a flight in words: what was flown, how it ended, and its verdict."""
+"""The summary of a flight in Markdown: what was flown, how it ended, and its verdict."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -15,7 +15,7 @@ def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> An
 
 
 def story(flight: Flight) -> str:
-    """What was flown and how it went, as Markdown."""
+    """What was flown and how it ended, as Markdown."""
     manifest = flight.manifest
     names = [setting(manifest, name) for name in ("scenario", "aircraft", "estimator", "autopilot")]
     seed = setting(manifest, "seed")
@@ -27,7 +27,7 @@ def story(flight: Flight) -> str:
     if verdict := manifest.get("verdict"):
         lines += markdown_table(map(Row.from_json, verdict))
     lines += ["", f"Heading is judged against the true {flight.heading_reference}.", ""]
-    orange = setting(manifest, "reference", "the truth")  # of a replayed log: whatever attitude it holds
+    orange = setting(manifest, "reference", "the truth")  # of a replayed log: the attitude recorded in it
     lines += [f"Orange is {markdown(orange)}, blue the estimate, green a sensor, grey a demand."]
     return "\n".join(lines)
 
