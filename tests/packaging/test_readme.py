@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 DOCUMENTS = (
     "README.md", "CONTRIBUTING.md", "docs/autopilot.md", "docs/claims.md", "docs/instruments.md", "docs/recording.md",
-    "docs/replay.md", "docs/reports.md", "docs/gate.md",
+    "docs/replay.md", "docs/reports.md", "docs/gate.md", "docs/scenarios.md",
 )  # fmt: skip
 
 # Commands that are shown and not run here, each with the reason.
@@ -35,7 +35,8 @@ NOT_RUN = {
     r"wingslevel claims --markdown docs/claims.md": "the same; tests/unit/test_claims.py compares the page",
     r"wingslevel replay .*": "needs a log of one's own; tests/unit/test_cli_replay.py writes some",
     r"wingslevel check --seeds 0-9 .*": "fifty flights, which tests/closed_loop flies; its options are run below",
-    r"wingslevel check --json verdict.json .*": "the same",
+    r"wingslevel check --json verdict.json( .*)?": "the same",
+    r"wingslevel list scenarios --markdown .*": "needs that verdict; tests/unit/test_scenario_page.py writes one",
     r"wingslevel agree .*": "needs the verdicts of two machines; tests/unit/test_agreement.py writes some",
 }  # fmt: skip
 
