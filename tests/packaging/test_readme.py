@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 DOCUMENTS = (
     "README.md", "CONTRIBUTING.md", "docs/autopilot.md", "docs/claims.md", "docs/instruments.md", "docs/recording.md",
-    "docs/replay.md", "docs/reports.md", "docs/gate.md",
+    "docs/replay.md", "docs/reports.md", "docs/gate.md", "docs/c_estimators.md",
 )  # fmt: skip
 
 # Commands that are shown and not run here, each with the reason.
@@ -36,6 +36,8 @@ NOT_RUN = {
     r"wingslevel replay .*": "needs a log of one's own; tests/unit/test_cli_replay.py writes some",
     r"wingslevel check --seeds 0-9 .*": "fifty flights, which tests/closed_loop flies; its options are run below",
     r"wingslevel check --json verdict.json .*": "the same",
+    r"(cc|c\+\+|rustc) .*": "need a compiler; tests/packaging/test_c_page.py runs them where there is one",
+    r"wingslevel fly crosswind --estimator \./mine(_cpp|_rust)?\.so.*": "the same",
     r"wingslevel agree .*": "needs the verdicts of two machines; tests/unit/test_agreement.py writes some",
 }  # fmt: skip
 
