@@ -53,6 +53,8 @@ if TYPE_CHECKING:
         MagSample,
         Measurements,
     )
+    from wingslevel._arrays import AirArrays, GpsArrays, MagArrays, estimate
+    from wingslevel._attitudes import Attitudes
     from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning
     from wingslevel._flight import Flight
     from wingslevel._flying import fly, load
@@ -68,6 +70,8 @@ _HOMES = {
         "AirData", "AttitudeEstimate", "AttitudeEstimator", "GpsFix", "Health", "ImuSample", "MagSample",
         "Measurements",
     ),
+    "wingslevel._arrays": ("AirArrays", "GpsArrays", "MagArrays", "estimate"),
+    "wingslevel._attitudes": ("Attitudes",),
     "wingslevel._errors": ("Interrupted", "WingslevelError", "WingslevelWarning"),
     "wingslevel._flight": ("Flight",),
     "wingslevel._flying": ("fly", "load"),
@@ -77,20 +81,25 @@ _HOMES = {
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "AirArrays",
     "AirData",
     "AttitudeEstimate",
     "AttitudeEstimator",
+    "Attitudes",
     "Flight",
+    "GpsArrays",
     "GpsFix",
     "Health",
     "ImuSample",
     "Interrupted",
+    "MagArrays",
     "MagSample",
     "Measurements",
     "WingslevelError",
     "WingslevelWarning",
     "__version__",
     "autopilots",
+    "estimate",
     "estimators",
     "export",
     "fly",

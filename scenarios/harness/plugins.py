@@ -283,6 +283,12 @@ def maker_name(spec: "str | Maker") -> str:
         return class_name(spec)
 
 
+def short_name(spec: "str | Maker") -> str:
+    """`maker_name` without the module or file."""
+    name, parenthesis, settings = maker_name(spec).partition("(")
+    return f"{name.rpartition(':')[2]}{parenthesis}{settings}"
+
+
 def _check_reference(spec: "str | Maker", estimator: object) -> None:
     from sim.flight_code import reference_of  # here, for it loads the compiler
 

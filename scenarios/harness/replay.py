@@ -28,7 +28,15 @@ from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.logs.validity import INTERVALS, LONGEST_S
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import Equipped, PluginError, equipped, heading_reference_of, learnt
+from scenarios.harness.plugins import (
+    Equipped,
+    Maker,
+    PluginError,
+    equipped,
+    heading_reference_of,
+    learnt,
+    short_name,
+)
 from sim.events import events_of
 from sim.flight_code import FlightCodeFailed, blaming, estimate_of, record_estimates
 from sim.log import Event, Flight, Log, Outcome, Phase
@@ -113,7 +121,7 @@ class Replayed:
         }
 
 
-def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None = None) -> Equipped:
+def make(spec: str | Maker, params: Mapping[str, Any], instruments: Instruments | None = None) -> Equipped:
     """The estimator of that name, with what is known of the instruments and some of its parameters changed.
 
     Raises
@@ -128,7 +136,7 @@ def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None =
 
 def replay(
     log: RecordedLog,
-    spec: str,
+    spec: str | Maker,
     params: Mapping[str, Any] | None = None,
     window: Window | None = None,
     withheld: Sequence[str] = (),
@@ -168,15 +176,15 @@ def replay(
     scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
     ns_per_update = math.nan if failure else ns_per_update
     return Replayed(
-        spec.rpartition(":")[2], reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
+        short_name(spec), reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
         said.refused,
     )  # fmt: skip
 
 
-def gone(spec: str, failure: str) -> Replayed:
+def gone(spec: str | Maker, failure: str) -> Replayed:
     """What there is of an estimator that took the process with it: no row, and why."""
     scores = dict.fromkeys(SCORES, math.nan)
-    return Replayed(spec.rpartition(":")[2], "course", Log.empty(0), 0, math.nan, None, scores, failure)
+    return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, scores, failure)
 
 
 def known_to(log: RecordedLog, withheld: Sequence[str] = ()) -> Instruments:
