@@ -31,7 +31,6 @@ from estimator.blocks.kernels import clip
 from estimator.blocks.screening import (
     FORCE_GOOD,
     FORCE_RANGE_M_S2,
-    G_M_S2,
     GPS,
     GYRO_RANGE_RAD_S,
     SCREEN,
@@ -42,7 +41,7 @@ from estimator.blocks.screening import (
     take_rate,
 )
 from estimator.compiler.jit import kernel
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
 from estimator.rotation import integrate
 
 MIN_SPEED_M_S = 3.0  # a slower course says nothing about the heading

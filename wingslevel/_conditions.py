@@ -147,7 +147,7 @@ def seeds_of(seeds: Any) -> list[int]:
     ------
     ValueError      naming what would be right
     """
-    from scenarios.harness.commands.check import parse_seeds
+    from scenarios.harness.seeds import parse_seeds
 
     if not isinstance(seeds, str):
         numbers = [seeds] if isinstance(plain(seeds), int) else plain(list(seeds))

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from estimator.rotation import to_euler
-from scenarios.harness.commands.aircraft_picture import BLUE, DPI, FAINT, GREEN, INK, ORANGE, RED, STYLE, VIOLET
+from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, INK, ORANGE, RED, STYLE, VIOLET
 from sim.outside.wording import plotted
 from wingslevel._errors import WingslevelError
 from wingslevel._html import number

@@ -1,13 +1,14 @@
-"""What a scenario demands: a metric, a limit for it, and how the flights of several seeds are judged together."""
+"""The checks of a scenario: a metric, its limit, and how the flights of several seeds are judged together."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from scenarios.harness.metrics import Measured, Metric, survived
+from scenarios.harness import metrics
+from scenarios.harness.metrics import Measured, Metric, Moment, SeriesOf, end, over, start, survived
 from sim.log import Flight
 from sim.outside.blame import Refused, home_of, shown, theirs
 
@@ -18,9 +19,9 @@ LOOSEST = 1.5  # a flight's own limit may be this much looser than the pooled on
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of a verdict.
+    """The result of one check: one line of a verdict.
 
-    note : what is missing where the value rests on too few samples, or what the metric raised (`raised`)
+    note : how many samples are missing, or what the metric raised (`raised`)
     """
 
     name: str
@@ -34,11 +35,11 @@ class Row:
 
 
 class _NotMeasured(RuntimeError):
-    """A metric, anyone's function, that raised, or returned something else."""
+    """A metric that raised, or did not return a Measured."""
 
 
 def _measured(value: Measured) -> Measured:
-    """What a metric returned in plain numbers; Refused where it is something else."""
+    """What a metric returned, as plain numbers; Refused if it is no Measured."""
     if not isinstance(value, Measured):
         raise Refused(f"its metric returned {shown(value)}, must return a Measured")
     return Measured(float(value.value), int(value.samples), int(value.expected))
@@ -46,12 +47,15 @@ def _measured(value: Measured) -> Measured:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One demand on a flight, and on several flights pooled.
+    """A limit on one metric, for a single flight and for several flights pooled.
 
-    metric : value of one flight, with the samples it rests on
-    limit, sense : of the pooled value, and of one flight where `per_flight_limit` is None
-    pooled : "rms" root of the mean square over the flights, "worst" the worst of them, "count" how many pass
-    per_flight_limit : at most 1.5 times as loose as `limit`
+    metric : value of one flight, and the number of samples it rests on
+    limit, sense : of the pooled value; also of a single flight if `per_flight_limit` is None
+    pooled : "rms" root of the mean square over the flights, "worst" the worst flight, "count" the flights that pass
+    per_flight_limit : limit of a single flight, at most 1.5 times as loose as `limit`
+
+    The constructors below (`rms`, `highest`, `lowest`, `settling`) reduce a series between two moments, by default from
+    the release to the planned end.
     """
 
     name: str
@@ -61,6 +65,46 @@ class Check:
     sense: Sense = "<="
     pooled: Pooling = "worst"
     per_flight_limit: float | None = None
+
+    @classmethod
+    def rms(
+        cls, name: str, unit: str, series: SeriesOf, limit: float, from_: Moment = start, to: Moment = end, *,
+        per_flight_limit: float | None = None, judged_share: float = 1.0,
+    ) -> "Check":  # fmt: skip
+        """RMS of `series`, at most `limit` over all flights and `per_flight_limit`, 1.5 times that, in each.
+
+        judged_share : fraction of the window's ticks that must be judged, see `metrics.over`
+        """
+        metric = over(series, metrics.rms, from_, to, judged_share=judged_share)
+        each = LOOSEST * limit if per_flight_limit is None else per_flight_limit
+        return cls(name, unit, metric, limit, pooled="rms", per_flight_limit=each)
+
+    @classmethod
+    def highest(
+        cls, name: str, unit: str, series: SeriesOf, limit: float, from_: Moment = start, to: Moment = end, *,
+        judged_share: float = 1.0,
+    ) -> "Check":  # fmt: skip
+        """Largest value of `series`: at most `limit` in every flight."""
+        return cls(name, unit, over(series, metrics.highest, from_, to, judged_share=judged_share), limit)
+
+    @classmethod
+    def lowest(
+        cls, name: str, unit: str, series: SeriesOf, limit: float, from_: Moment = start, to: Moment = end
+    ) -> "Check":
+        """Smallest value of `series`: at least `limit` in every flight."""
+        return cls(name, unit, over(series, metrics.lowest, from_, to), limit, ">=")
+
+    @classmethod
+    def settling(
+        cls, name: str, series: SeriesOf, within: float, limit_s: float, from_: Moment = start, to: Moment = end
+    ) -> "Check":
+        """Time from `from_` until `series` stays at or below `within` up to `to`: at most `limit_s` in every flight."""
+        return cls(name, "s", metrics.settling(series, within, from_, to), limit_s)
+
+    def limited(self, limit: float) -> "Check":
+        """The same check with another `limit`; the limit of a single flight keeps its ratio to it."""
+        each = None if self.per_flight_limit is None else self.per_flight_limit * (limit / self.limit)
+        return replace(self, limit=limit, per_flight_limit=each)
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.limit):
@@ -76,7 +120,7 @@ class Check:
             )
 
     def judge(self, flight: Flight) -> Row:
-        """The line of one flight."""
+        """The result for one flight."""
         limit = self.limit if self.per_flight_limit is None else self.per_flight_limit
         try:
             with theirs(_NotMeasured, home_of(self.metric)):
@@ -88,7 +132,7 @@ class Check:
         return Row(self.name, self.unit, measured.value, self.sense, limit, passed, note)
 
     def pool(self, rows: Sequence[Row]) -> Row:
-        """The line of all flights, from the lines of each; a single flight is judged by its own limit."""
+        """The result over all flights, from that of each; a single flight is judged by the per-flight limit."""
         short = sum(bool(row.note) for row in rows)
         note = f"{short} of {len(rows)} flights too short" if short else ""
         note = next((row.note for row in rows if row.raised), note)
@@ -109,7 +153,7 @@ class Check:
         return float(values.max() if self.sense == "<=" else values.min())
 
     def _holds(self, value: float, limit: float) -> bool:
-        """Written so that NaN fails."""
+        """Whether `value` is within `limit`; NaN is not."""
         return bool(value <= limit if self.sense == "<=" else value >= limit)
 
 

@@ -1,4 +1,4 @@
-"""A scenario: what flies, where, through what air, commanded how, for how long, and what it must pass."""
+"""A scenario: aircraft, start, air, commands, length of the flight, and the checks it must pass."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -15,21 +15,22 @@ Moments = Callable[[Flight], Iterable[float]]  # times since the release
 
 
 class ScriptFailed(ValueError):
-    """A scenario's script that raised, or that returned none."""
+    """A scenario's script raised, or did not return a Script."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One scenario; its file exports it as ``SCENARIO``, and variants of it as ``SCENARIOS``.
+    """One scenario; its file exports it as ``SCENARIO``, and with its variants as ``SCENARIOS``.
 
-    name        as typed on the command line: that of its file, a variant's with an ending
+    name        as typed on the command line: the name of its file; a variant has an ending appended
     story       the docstring of its file: a table of Story / Verifies / Aircraft / Wind / Sensors / Passes when
-    config      what is flown where nothing is overridden
-    script      the set-points, from the resolved configuration
-    checks      what it must pass
-    milestones  moments found in the truth of the flight, by what to call them; they become events
-    shows_failure   it passes where its own estimator fails as the paper says, and for no estimator that copes:
-                it is left out where an estimator of one's own flies all scenarios, or a family of them
+    config      the configuration, before any override
+    script      from the resolved configuration to the set-points
+    checks      what the flight must pass
+    milestones  label -> function that finds such moments in the true motion; they become events of the flight
+    expected_to_fail    the scenario shows a failure that a paper predicts for its own estimator: it passes if that
+                estimator fails, so a better one does not pass.  It is left out when another estimator is checked on all
+                scenarios or on a pattern of names
     """
 
     name: str
@@ -38,7 +39,7 @@ class Scenario:
     script: Callable[[FlightConfig], Script]
     checks: tuple[Check, ...]
     milestones: dict[str, Moments] = field(default_factory=dict)
-    shows_failure: bool = False
+    expected_to_fail: bool = False
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name.isidentifier():
@@ -49,35 +50,53 @@ class Scenario:
             ("script", "a function from the configuration to a Script", callable(self.script)),
             ("checks", "Checks", isinstance(self.checks, tuple | list) and all(map(_is_check, self.checks))),
             ("milestones", "functions by names", _are_milestones(self.milestones)),
-            ("shows_failure", "True or False", isinstance(self.shows_failure, bool)),
+            ("expected_to_fail", "True or False", isinstance(self.expected_to_fail, bool)),
         ):
             if not fits:
                 raise ValueError(f"scenario {self.name}: {name} is {shown(getattr(self, name))}, must be {right}")
         names = [check.name for check in self.checks]
         twice = {name for name in names if names.count(name) > 1}
         if not names or twice:
-            fault = f"checks named twice: {', '.join(sorted(twice))}" if twice else "no checks: a scenario judges"
+            fault = f"checks named twice: {', '.join(sorted(twice))}" if twice else "no checks; it needs at least one"
             raise ValueError(f"scenario {self.name}: {fault}")
 
     @property
-    def told_as(self) -> str:
+    def summary(self) -> str:
         """The first line of the story."""
         return self.story.strip().splitlines()[0] if self.story.strip() else ""
 
-    def varied(self, ending: str, told: str, changes: Mapping[str, Any], **others: Any) -> "Scenario":
-        """A variant, called ``name_ending``: the configuration with `changes` by dotted names, `others` of the fields.
+    def varied(
+        self, ending: str, summary: str, changes: Mapping[str, Any], limits: Mapping[str, float] | None = None,
+        **fields: Any,
+    ) -> "Scenario":  # fmt: skip
+        """A variant, named ``name_ending``.
 
-        told : what becomes the first line of its story
+        Parameters
+        ----------
+        summary     the first line of its story
+        changes     of the configuration, by dotted names
+        limits      of checks, by their names: everything else about those checks stays as it is
+        fields      other fields of the scenario, replaced
+
+        Raises
+        ------
+        ValueError  `limits` names a check that the scenario does not have
         """
-        story = "\n".join((told, *self.story.strip().splitlines()[1:]))
-        return replace(self, name=f"{self.name}_{ending}", story=story, config=override(self.config, changes), **others)
+        story = "\n".join((summary, *self.story.strip().splitlines()[1:]))
+        name, config = f"{self.name}_{ending}", override(self.config, changes)
+        varied = replace(self, name=name, story=story, config=config, **fields)
+        limits = dict(limits or {})
+        checks = tuple(c.limited(limits.pop(c.name)) if c.name in limits else c for c in varied.checks)
+        if limits:
+            raise ValueError(f"scenario {name}: limits of checks that it does not have: {', '.join(limits)}")
+        return replace(varied, checks=checks)
 
     def scripted(self, config: FlightConfig) -> Script:
         """The set-points under the resolved `config`.
 
         Raises
         ------
-        ScriptFailed    one line: the scenario's script raises, or returns none
+        ScriptFailed    one line: the script raised, or did not return a Script
         """
         with theirs(lambda line: ScriptFailed(f"scenario {self.name}: script: {line}"), home_of(self.script)):
             script = self.script(config)
@@ -91,7 +110,7 @@ class Scenario:
             return script
 
     def events(self, flight: Flight) -> tuple[tuple[Event, ...], str]:
-        """The milestones that `flight` reached, and a line on the first that could not be found, or nothing."""
+        """The milestones that `flight` reached; and what the first function that failed raised, or an empty text."""
         last_s = float(flight.log.truth["t_s"][-1]) if len(flight.log) else 0.0
         events, fault = [], ""
         for text, moments in self.milestones.items():
@@ -106,11 +125,11 @@ class Scenario:
 
 
 class _Unfound(RuntimeError):
-    """A milestone whose function raised."""
+    """The function of a milestone raised."""
 
 
 def _is_check(check: object) -> bool:
-    """Whether `check` is a Check of which every field is what it must be."""
+    """Whether `check` is a Check whose fields have the right types."""
     if not isinstance(check, Check):
         return False
     words = (check.sense, get_args(Sense)), (check.pooled, get_args(Pooling))

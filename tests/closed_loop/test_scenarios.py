@@ -14,7 +14,7 @@ from scenarios.harness.verdict import Verdict, judge
 from sim.log import Flight, Outcome, Phase
 
 NAMES = sorted(registered())
-TO_FAIL = {name for name, scenario in registered().items() if scenario.shows_failure}
+TO_FAIL = {name for name, scenario in registered().items() if scenario.expected_to_fail}
 
 
 @cache

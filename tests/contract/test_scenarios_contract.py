@@ -34,7 +34,7 @@ def test_scenario_story_has_every_section(name):
     lines = scenario.story.splitlines()
     for section in SECTIONS:
         assert any(line.startswith(section) for line in lines), section
-    assert scenario.told_as.endswith(".")
+    assert scenario.summary.endswith(".")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -63,7 +63,7 @@ def test_scenario_script_begins_at_the_start_and_ends_before_the_flight(name):
 def test_scenario_checks_demand_survival_and_say_their_units(name):
     """A name, a unit for all that has a dimension, and survival first, but where the point is that it does not."""
     checks = find(name).checks
-    assert checks[0].name == "survived" or find(name).shows_failure
+    assert checks[0].name == "survived" or find(name).expected_to_fail
     assert all(check.name and (check.unit or check.name == "survived") for check in checks)
 
 
@@ -91,6 +91,19 @@ def test_scenario_checks_fail_a_flight_that_ended_early(name, n_ticks):
     assert not verdict.passed
     assert not any(row.passed for row in (verdict.rows[0], *over_windows))
     assert scenario.events(flight) is not None
+
+
+def test_varied_overrides_limits_only_and_rejects_unknown_checks():
+    """The variant has the checks of its scenario in their order, with the limits that are named."""
+    first = find("crosswind")
+    name = "inclination error RMS"
+    variant = first.varied("again", "Again.", {"duration_s": 30.0}, {name: 2.0})
+    assert (variant.name, variant.summary, variant.config.duration_s) == ("crosswind_again", "Again.", 30.0)
+    pairs = list(zip(first.checks, variant.checks, strict=True))
+    assert [b.limit for _, b in pairs] == [1.0, 2.0, 3.0]
+    assert all(a == b or (a.name, b.per_flight_limit, a.metric) == (name, 3.0, b.metric) for a, b in pairs)
+    with pytest.raises(ValueError, match=r"scenario crosswind_again: .* does not have: tilt"):
+        first.varied("again", "Again.", {}, {"tilt": 2.0})
 
 
 def test_find_of_an_unknown_scenario_names_the_near_misses():

@@ -14,7 +14,7 @@ from estimator import ESTIMATORS
 from estimator.instruments import PROPERTIES, Instruments, Known
 from scenarios.harness import plugins
 from scenarios.harness.cli.app import run
-from scenarios.harness.commands.compare import LETTERS
+from scenarios.harness.commands.comparison import LETTERS
 from scenarios.harness.registry import find
 
 ROOT = Path(__file__).resolve().parents[2]

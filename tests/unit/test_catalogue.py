@@ -25,7 +25,7 @@ def test_catalogue_names_equal_registries() -> None:
 
 def test_catalogue_scenarios_are_told_by_the_first_line_of_their_story() -> None:
     """The line beside a scenario is the one its file opens with."""
-    assert catalogue()["scenarios"] == {name: scenario.told_as for name, scenario in registered().items()}
+    assert catalogue()["scenarios"] == {name: scenario.summary for name, scenario in registered().items()}
 
 
 def test_aircraft_listed_load_into_jsbsim() -> None:

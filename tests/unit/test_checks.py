@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.harness.checks import LOOSEST, SURVIVED, Check
-from scenarios.harness.metrics import Measured
+from scenarios.harness.metrics import Measured, Series, at
 from sim.log import Flight, Log, Outcome
 
 FLIGHT = Flight(Log.empty(1), 0.02, 0.0, Outcome.COMPLETED, "course")
@@ -114,6 +114,47 @@ def test_check_without_a_finite_limit_is_refused():
     """A limit that nothing can break is none."""
     with pytest.raises(ValueError, match="must be a finite number"):
         check_of(1.0, limit=math.inf)
+
+
+def ramp(flight):
+    """A series that falls from 10 to 0 over 10 s, at 10 Hz."""
+    t_s = np.arange(1, 101) * flight.dt_s
+    return Series(t_s, 10.0 - t_s, np.ones(100, np.bool_))
+
+
+RAMP = Flight(Log.empty(1), 0.1, 0.0, Outcome.COMPLETED, "course", manifest={"config": {"duration_s": 10.0}})
+
+
+@pytest.mark.parametrize(
+    ("check", "measured", "sense", "limit"),
+    [
+        (Check.highest("x", "m", ramp, 7.0, at(4.0)), 5.9, "<=", 7.0),
+        (Check.lowest("x", "m", ramp, 3.0, at(4.0), at(6.0)), 4.0, ">=", 3.0),
+        (Check.settling("x", ramp, 2.5, 9.0, at(1.0)), 6.4, "<=", 9.0),
+        (Check.rms("x", "m", ramp, 4.0, at(9.0)), math.sqrt(0.285), "<=", 6.0),
+        (Check.rms("x", "m", ramp, 4.0, at(9.0), per_flight_limit=5.0), math.sqrt(0.285), "<=", 5.0),
+    ],
+)
+def test_constructors_reduce_a_series_over_their_window(check, measured, sense, limit):
+    """Extremes, RMS and settling time of a ramp in closed form; settling is below 2.5 from 7.5 s on."""
+    row = check.judge(RAMP)
+    assert row.measured == pytest.approx(measured, rel=0, abs=1e-9)
+    assert (row.sense, row.limit, row.passed) == (sense, limit, True)
+
+
+def test_rms_constructor_allows_a_flight_one_and_a_half_times_the_pooled_limit():
+    """Unless its own limit is given; pooled as the root of the mean square."""
+    check = Check.rms("x", "m", ramp, 4.0)
+    assert (check.limit, check.per_flight_limit, check.pooled) == (4.0, 6.0, "rms")
+    assert not Check.rms("x", "m", ramp, 4.0, at(9.0), at(12.0)).judge(RAMP).passed  # it ends at 10 s
+
+
+def test_limited_changes_the_limit_and_scales_that_of_a_flight():
+    """Everything else stays as it is."""
+    check = Check.rms("x", "m", ramp, 4.0, per_flight_limit=5.0).limited(8.0)
+    assert (check.limit, check.per_flight_limit) == (8.0, 10.0)
+    assert check.judge(RAMP).measured == Check.rms("x", "m", ramp, 4.0).judge(RAMP).measured
+    assert Check.highest("x", "m", ramp, 7.0).limited(9.0).per_flight_limit is None
 
 
 @pytest.mark.parametrize("outcome", list(Outcome))

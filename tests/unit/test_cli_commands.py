@@ -13,6 +13,7 @@ from scenarios.harness.cli.app import run
 from scenarios.harness.commands import check as gate
 from scenarios.harness.commands.bench import STAGES
 from scenarios.harness.flight import Prepared
+from scenarios.harness.seeds import parse_seeds
 from sim import recording
 from sim.log import Outcome
 
@@ -211,7 +212,7 @@ def test_check_interrupted_keeps_what_was_finished(here: Path, ctrl_c, in_proces
 @pytest.mark.parametrize(("text", "seeds"), [("3", [3]), ("0-2", [0, 1, 2]), ("5,0-1,5", [5, 0, 1])])
 def test_parse_seeds_ranges_and_lists(text: str, seeds: list[int]) -> None:
     """Each seed once, in the order in which they were named."""
-    assert gate.parse_seeds(text) == seeds
+    assert parse_seeds(text) == seeds
 
 
 def test_bench_json_names_every_figure_with_its_unit(capfd) -> None:

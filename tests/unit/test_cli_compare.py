@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from estimator import ESTIMATORS
+from scenarios.harness import timing
 from scenarios.harness.checks import Row
 from scenarios.harness.cli.app import run
-from scenarios.harness.commands import compare, compare_picture
+from scenarios.harness.commands import compare, compare_picture, comparison
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.metrics import Series, inclination_error_deg, rms
 from scenarios.harness.registry import find
@@ -27,7 +28,7 @@ def here(tmp_path: Path, monkeypatch) -> Path:
     """An empty working directory, and no time spent on timing."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(compare, "TIMED_S", 2.0)
-    monkeypatch.setattr(compare, "TIMED_REPEATS", 1)
+    monkeypatch.setattr(timing, "REPEATS", 1)
     return tmp_path
 
 
@@ -180,14 +181,14 @@ def entrant(name, errors, outcome=Outcome.COMPLETED):
     t = 0.02 * np.arange(1, errors.shape[1] + 1)
     rows = (Row("survived", "", 1.0, ">=", 1.0, True),)
     flown = tuple(
-        compare.Traced(
+        comparison.Traced(
             FlightVerdict("crosswind", name, seed, outcome, rows, {"flown_s": 1.0}),
             *[Series(t, e, np.ones(len(t), bool))] * 2,
         )
         for seed, e in enumerate(errors)
     )
     pooled = PooledVerdict("crosswind", name, len(flown), rows)
-    return compare.Entrant(name, ("gyro",), "nose", len(flown), flown, pooled)
+    return comparison.Entrant(name, ("gyro",), "nose", len(flown), flown, pooled)
 
 
 def test_entrant_numbers_of_known_errors() -> None:
@@ -203,7 +204,7 @@ def test_picture_of_one_and_of_many_estimators(tmp_path: Path, n: int) -> None:
     plan = compare.prepare("crosswind", ["gyro_only"], [0], {})
     errors = [entrant(f"a{i}", np.full((1 + i % 3, 200), 0.3 * i)) for i in range(n)]
     errors += [entrant("early", np.full((2, 0), 0.0), Outcome.GROUND_CONTACT)]
-    compare_picture.draw(compare.Comparison(plan.scenario, plan.config, (0,), tuple(errors)), tmp_path / "c.svg")
+    compare_picture.draw(comparison.Comparison(plan.scenario, plan.config, (0,), tuple(errors)), tmp_path / "c.svg")
     drawn = (tmp_path / "c.svg").read_text(encoding="utf-8")
     assert all(f'"axes_{i}"' in drawn for i in range(1, 7))
 
@@ -211,6 +212,6 @@ def test_picture_of_one_and_of_many_estimators(tmp_path: Path, n: int) -> None:
 def test_picture_of_nothing_is_refused(tmp_path: Path) -> None:
     """Interrupted before the first flight ended."""
     plan = compare.prepare("crosswind", ["gyro_only"], [0], {})
-    none = compare.Entrant("a", (), "nose", 1, (), None)
+    none = comparison.Entrant("a", (), "nose", 1, (), None)
     with pytest.raises(ValueError, match="nothing was flown"):
-        compare_picture.draw(compare.Comparison(plan.scenario, plan.config, (0,), (none,)), tmp_path / "c.png")
+        compare_picture.draw(comparison.Comparison(plan.scenario, plan.config, (0,), (none,)), tmp_path / "c.png")

@@ -11,7 +11,7 @@ import pytest
 from scenarios.harness.checks import Row
 from scenarios.harness.cli import console
 from scenarios.harness.commands import check as gate
-from scenarios.harness.commands import compare
+from scenarios.harness.commands import comparison
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict
 from sim.log import Outcome
 from sim.outside.wording import brief, json_text, markdown, plotted, printable
@@ -90,7 +90,7 @@ def test_terminal_of_any_text_prints_it_and_obeys_none(text: str, monkeypatch) -
     """No control character gets through to 60 columns of ASCII; the numbers do."""
     monkeypatch.setenv("COLUMNS", "60")
     with terminal() as stream:
-        gate.tell(verdict_with(text))
+        gate.print_report(verdict_with(text))
         console.out().print(console.table("t", ("", "n"), [[text, "5678"]], wrapping=(0,)))
     shown = printed(stream)
     assert all(c == "\n" or c.isprintable() for c in shown)
@@ -106,7 +106,7 @@ def test_tables_narrow_keep_names_and_numbers(columns: int, monkeypatch, capsys)
     name = "folder/my_filter_of_a_long_name.py:MyFilter"
     rows = [Row("inclination error RMS", "deg", 12345.678, "<=", 6.0, False, "3 of 4 samples")]
     console.out().print(console.verdict_table(f"crosswind, {name}", rows))
-    headings = compare._HEADINGS
+    headings = comparison._HEADINGS
     cells = [name, "GAP", " 1.23  4.5  6.7", "8.9 c", "0.55*", "9/10 5/7"]
     console.out().print(console.table("crosswind", headings, [cells], text=(0, 1), wrapping=(0,)))
     shown = " ".join(capsys.readouterr().out.split())

@@ -11,7 +11,7 @@ import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from scenarios.harness.commands.aircraft_picture import BLUE, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
+from scenarios.harness.picture_style import BLUE, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
 
 __all__ = ["BLUE", "FAINT", "GREEN", "GRID", "INK", "ORANGE", "RED", "TEAL", "VIOLET", "axes", "label", "png"]
 

@@ -5,7 +5,6 @@ problem of usage or configuration is one line on standard error, found before an
 imports wait until a command needs them.
 """
 
-from functools import partial
 from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Annotated
@@ -16,44 +15,35 @@ from scenarios.harness.cli import console
 from scenarios.harness.cli import values as complete
 from scenarios.harness.cli.console import INTERRUPTED, USAGE
 from scenarios.harness.cli.options import (
-    AircraftOption,
-    AutopilotOption,
     CalibrationOption,
+    Changes,
     ColumnsOption,
     EstimatorOption,
-    FaultOption,
     FlightTimeoutOption,
-    GpsRateOption,
-    GustOption,
-    ImuRateOption,
     JsonOption,
     LedgerOption,
     LogEstimatorsOption,
     MarkdownOption,
+    NoRerunOption,
+    OutOption,
     ParameterOption,
+    PictureOption,
     ReferenceOption,
     ScenarioArgument,
-    SensorsOption,
-    SetOption,
+    SeedsOption,
     SeveralOption,
-    ShearOption,
-    ThermalsOption,
-    TurbulenceOption,
     UnitOption,
     WebOption,
-    WindOption,
     WithholdOption,
     WorkersOption,
-    air,
     changes_of,
-    fitted,
+    flies,
     given,
     names_of,
     time_limit,
 )
-from scenarios.harness.cli.reports import attempt, check_file, losses, refusal, reporting, usage, write
+from scenarios.harness.cli.reports import losses, reporting
 from scenarios.harness.cli.values import Commands, number_in, whole_in
-from scenarios.harness.gate import guard
 from scenarios.harness.gate.guard import BROKEN
 from sim.outside.blame import show_traceback, show_tracebacks
 from sim.outside.signals import listening
@@ -126,20 +116,12 @@ def list_(json_: JsonOption = None) -> None:
 
 
 @app.command()
+@flies
 def fly(
     scenario: ScenarioArgument,
     estimator: EstimatorOption = None,
-    aircraft: AircraftOption = None,
-    autopilot: AutopilotOption = None,
-    wind: WindOption = None,
-    shear: ShearOption = None,
-    gust: GustOption = None,
-    turbulence: TurbulenceOption = None,
-    thermals: ThermalsOption = None,
-    gps_rate: GpsRateOption = None,
-    imu_rate: ImuRateOption = None,
-    sensors: SensorsOption = None,
-    fault: FaultOption = None,
+    *,
+    changes: Changes,
     duration: Annotated[
         float | None,
         typer.Option(metavar="S", help="Length of the flight after the release.", parser=number_in(-1e9, 1e9, "s")),
@@ -152,55 +134,34 @@ def fly(
             parser=whole_in(-(10**18), 10**18),
         ),
     ] = None,
-    set_: SetOption = None,
-    withhold: WithholdOption = None,
     flight_timeout: FlightTimeoutOption = None,
-    out: Annotated[Path, typer.Option(help="Folder for the recording.")] = FLIGHTS,
-    no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
+    out: OutOption = FLIGHTS,
+    no_rerun: NoRerunOption = False,
     live: Annotated[bool, typer.Option("--live", help="Watch it in the Rerun viewer, in real time.")] = False,
     web: WebOption = False,
     json_: JsonOption = None,
 ) -> int:
     """Fly a scenario once, record it, judge it."""
-    from scenarios.harness.commands import fly as single
-    from scenarios.harness.commands import view as viewing
+    from scenarios.harness.commands import fly as command
 
-    named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault) | given(
-        {"estimator": estimator, "duration_s": duration, "seed": seed, "withheld": withhold}
+    named = given({"estimator": estimator, "duration_s": duration, "seed": seed})
+    limit_s = time_limit(flight_timeout, live=live)
+    return command.run(
+        scenario, lambda: changes() | named, out, rerun=not no_rerun, live=live, web=web, limit_s=limit_s, json_=json_
     )
-    with reporting(json_) as report:
-        with usage():
-            changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
-            limit_s = time_limit(flight_timeout, live=live)
-            flown = single.fly(scenario, changes, out, rerun=not no_rerun, live=live, web=web, limit_s=limit_s)
-        report(flown.to_json())
-        single.tell(flown)  # last: a reader who closes the pipe loses no report
-    if flown.shown is not None:
-        viewing.stay(flown.shown.viewer)
-    return flown.exit_code
 
 
 @app.command()
+@flies
 def check(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Scenarios; all of them where none is named.", autocompletion=complete.scenarios),
+        typer.Argument(help="Scenarios; all of them by default.", autocompletion=complete.scenarios),
     ] = None,
-    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")] = "0-9",
+    seeds: SeedsOption = "0-9",
     estimator: EstimatorOption = None,
-    wind: WindOption = None,
-    shear: ShearOption = None,
-    gust: GustOption = None,
-    turbulence: TurbulenceOption = None,
-    thermals: ThermalsOption = None,
-    aircraft: AircraftOption = None,
-    autopilot: AutopilotOption = None,
-    gps_rate: GpsRateOption = None,
-    imu_rate: ImuRateOption = None,
-    sensors: SensorsOption = None,
-    fault: FaultOption = None,
-    set_: SetOption = None,
-    withhold: WithholdOption = None,
+    *,
+    changes: Changes,
     workers: WorkersOption = None,
     flight_timeout: FlightTimeoutOption = None,
     ledger: LedgerOption = None,
@@ -209,33 +170,12 @@ def check(
     json_: JsonOption = None,
 ) -> int:
     """The gate for CI: fly scenarios on many seeds, judge each flight and all of them pooled."""
-    from scenarios.harness.commands import check as gate
-    from scenarios.harness.gate import workers as crew
-    from scenarios.harness.gate.ledger import Ledger
-    from scenarios.harness.gate.preparing import in_time
+    from scenarios.harness.commands import check as command
 
-    with reporting(json_) as report:
-        with usage():
-            for path in (junit, markdown):
-                check_file(path)
-            named = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
-            changes = changes_of(set_) | named | air(wind, shear, gust, turbulence, thermals)
-            changes |= given({"withheld": withhold})
-            if "seed" in changes:
-                raise ValueError(f"--set seed={changes['seed']}: name the seeds to fly with --seeds")
-            with in_time(time_limit(flight_timeout)):
-                tasks = gate.tasks(names or [], gate.parse_seeds(seeds), estimator, changes, keyed=ledger is not None)
-            kept = None if ledger is None else Ledger(ledger)
-            guard.stage("while it judged", guard.BROKEN)
-            with console.progress("flying", "flights") as advance:
-                run = gate.fly_all(
-                    tasks, workers or crew.processors(), advance, limit_s=time_limit(flight_timeout), ledger=kept
-                )
-        write(junit, run.verdict.to_junit)
-        write(markdown, run.verdict.to_markdown)
-        report(run.to_json())
-        gate.tell(run.verdict)  # last: a reader who closes the pipe loses no report
-    return run.exit_code
+    return command.run(
+        names or [], seeds, estimator, changes, workers=workers, limit_s=time_limit(flight_timeout),
+        ledger=ledger, junit=junit, markdown=markdown, json_=json_,
+    )  # fmt: skip
 
 
 @app.command()
@@ -257,73 +197,33 @@ def agree(
     json_: JsonOption = None,
 ) -> int:
     """Compare the verdicts of two machines: the same flights, the same outcomes, values within a tolerance."""
-    from scenarios.harness.commands import agree as agreement
+    from scenarios.harness.commands import agree as command
 
-    with reporting(json_) as report:
-        with usage():
-            reported = [] if report_only == "none" else names_of(report_only, "--report-only")
-            compared = agreement.compare(agreement.read(first), agreement.read(second), tolerance, reported)
-        report(compared.to_json())
-        agreement.tell(compared)  # last: a reader who closes the pipe loses no file
-    return compared.exit_code
+    reported = [] if report_only == "none" else names_of(report_only, "--report-only")
+    return command.run(first, second, tolerance, reported, json_)
 
 
 @app.command()
+@flies
 def compare(
     scenario: ScenarioArgument,
     estimators: SeveralOption = None,
-    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds that each of them flies: 0-9 or 0,2,5-7.")] = "0-9",
-    wind: WindOption = None,
-    shear: ShearOption = None,
-    gust: GustOption = None,
-    turbulence: TurbulenceOption = None,
-    thermals: ThermalsOption = None,
-    aircraft: AircraftOption = None,
-    autopilot: AutopilotOption = None,
-    gps_rate: GpsRateOption = None,
-    imu_rate: ImuRateOption = None,
-    sensors: SensorsOption = None,
-    fault: FaultOption = None,
-    set_: SetOption = None,
-    withhold: WithholdOption = None,
+    seeds: SeedsOption = "0-9",
+    *,
+    changes: Changes,
     workers: WorkersOption = None,
     flight_timeout: FlightTimeoutOption = None,
-    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw it, as PNG, SVG or PDF.")] = None,
+    picture: PictureOption = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
     """Estimators side by side: each flies the scenario on the same seeds, through the same air and noise."""
-    from scenarios.harness.commands import aircraft as handbook
-    from scenarios.harness.commands import check as gate
-    from scenarios.harness.commands import compare as comparing
-    from scenarios.harness.gate import workers as crew
-    from scenarios.harness.gate.preparing import in_time
+    from scenarios.harness.commands import compare as command
 
-    with reporting(json_) as report:
-        with usage():
-            check_file(picture)
-            check_file(markdown)
-            handbook.check_picture(picture)
-            carried = fitted(aircraft, autopilot, gps_rate, imu_rate, sensors, fault)
-            changes = changes_of(set_) | carried | air(wind, shear, gust, turbulence, thermals)
-            changes |= given({"withheld": withhold})
-            wanted = names_of(estimators, "--estimators")
-            with in_time(time_limit(flight_timeout)):
-                plan = comparing.prepare(scenario, wanted, gate.parse_seeds(seeds), changes)
-            guard.stage("while it compared", guard.BROKEN)
-            with console.progress("flying", "flights") as advance:
-                compared = comparing.fly(
-                    plan, workers or crew.processors(), advance, limit_s=time_limit(flight_timeout)
-                )
-        if picture is not None:
-            from scenarios.harness.commands import compare_picture
-
-            with attempt():
-                compare_picture.draw(compared, picture)
-        write(markdown, compared.to_markdown)
-        report(compared.to_json())
-        comparing.tell(compared)  # last: a reader who closes the pipe loses no report
-    return compared.exit_code
+    return command.run(
+        scenario, names_of(estimators, "--estimators"), seeds, changes, workers=workers,
+        limit_s=time_limit(flight_timeout), picture=picture, markdown=markdown, json_=json_,
+    )  # fmt: skip
 
 
 @app.command()
@@ -337,44 +237,20 @@ def claims(
     ] = None,
     workers: WorkersOption = None,
     flight_timeout: FlightTimeoutOption = None,
-    list_only: Annotated[bool, typer.Option("--list", help="Say what claims there are, and measure none.")] = False,
+    list_only: Annotated[bool, typer.Option("--list", help="List the claims, and measure none.")] = False,
     pictures: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Draw them. [default: images beside the Markdown]")
     ] = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
-    """What the papers claim, put to the test: each with its numbers, its verdict and its picture."""
-    from scenarios.harness.claims import report as claim_report
-    from scenarios.harness.claims import run as claim_run
-    from scenarios.harness.claims.registry import matching
-    from scenarios.harness.commands import check as gate
-    from scenarios.harness.gate import workers as crew
+    """Test what the papers claim: each claim with its numbers, its verdict and its picture."""
+    from scenarios.harness.commands import claims as command
 
-    with reporting(json_) as report:
-        with usage():
-            wanted = matching(names or [])
-            if list_only:
-                report(claim_report.listed(wanted))
-                claim_report.tell_list(wanted)
-                return 0
-            check_file(markdown)
-            folder = claim_report.folder_of_pictures(markdown, pictures)
-            numbers = None if seeds is None else gate.parse_seeds(seeds)
-            with console.progress("measuring", "claims") as advance:
-                findings = claim_run.measure(
-                    wanted,
-                    numbers,
-                    workers or crew.processors(),
-                    advance,
-                    drawn=folder is not None,
-                    limit_s=time_limit(flight_timeout),
-                )
-        claim_report.write_all(findings, markdown, folder)
-        report(findings.to_json())
-        # Last: a reader who closes the pipe loses no file.
-        claim_report.tell(findings, detailed=bool(names) and len(wanted) == 1)
-    return findings.exit_code
+    return command.run(
+        names or [], seeds, workers=workers, limit_s=time_limit(flight_timeout), list_only=list_only,
+        pictures=pictures, markdown=markdown, json_=json_,
+    )  # fmt: skip
 
 
 @app.command()
@@ -392,33 +268,25 @@ def replay(
         typer.Option(metavar="M/S", help="Ground speed above which it flies.", parser=number_in(-1e6, 1e6, "m/s")),
     ] = 5.0,
     settle: Annotated[
-        float, typer.Option(metavar="S", help="Not judged after it first flew.", parser=number_in(-1e6, 1e6, "s"))
+        float,
+        typer.Option(metavar="S", help="Seconds ignored after becoming airborne.", parser=number_in(-1e6, 1e6, "s")),
     ] = 10.0,
-    out: Annotated[Path, typer.Option(help="Folder for the recordings.")] = FLIGHTS,
-    no_rerun: Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")] = False,
+    out: OutOption = FLIGHTS,
+    no_rerun: NoRerunOption = False,
     json_: JsonOption = None,
 ) -> int:
     """Run estimators over a recorded log and score them against the attitude that it holds."""
-    from scenarios.harness.commands import replay as replaying
+    from scenarios.harness.commands import replay as command
     from scenarios.harness.replay import Window
 
-    with reporting(json_) as report:
-        with usage():
-            told = replaying.run(
-                log,
-                names_of(estimator, "--estimator"),
-                out,
-                reference=reference,
-                columns=columns,
-                imu=imu,
-                params=changes_of(set_),
-                withheld=names_of(withhold, "--withhold"),
-                window=Window(airborne, settle, calibration),
-                rerun=not no_rerun,
-            )
-        report(told.to_json())
-        replaying.tell(told)  # last: a reader who closes the pipe loses no file
-    return told.exit_code
+    return command.run(
+        log, lambda: names_of(estimator, "--estimator"), out, json_,
+        lambda: {
+            "reference": reference, "columns": columns, "imu": imu, "params": changes_of(set_),
+            "withheld": names_of(withhold, "--withhold"), "window": Window(airborne, settle, calibration),
+            "rerun": not no_rerun,
+        },
+    )  # fmt: skip
 
 
 @app.command()
@@ -434,43 +302,21 @@ def bench(
     json_: JsonOption = None,
 ) -> int:
     """Speed: the closed loop against bare JSBSim in the same run, and the estimator alone."""
-    with reporting(json_) as report:
-        from scenarios.harness.commands import bench as benchmark
+    from scenarios.harness.commands import bench as command
 
-        estimator = estimator or "premerlani"
-        try:
-            with usage(), console.progress("measuring", "pairs") as advance:
-                speed = benchmark.measure(estimator, seconds, repeats, advance)
-        except benchmark.NotTimed as problem:
-            report({"passed": False, "estimator": estimator, "failure": str(problem)})
-            console.error(str(problem))
-            return problem.exit_code
-        benchmark.tell(speed)
-        report(speed.to_json())
-    return 0 if speed.passed else 1
+    return command.run(estimator or "premerlani", seconds, repeats, json_)
 
 
 @app.command()
 def aircraft(
     name: Annotated[str, typer.Argument(help="Name of an aircraft.", autocompletion=complete.aircraft)],
-    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
+    picture: PictureOption = None,
     json_: JsonOption = None,
 ) -> None:
-    """The handbook page of an aeroplane: speeds, glide, climb, turns, stability and natural modes."""
-    from scenarios.harness.commands import aircraft as handbook
+    """Print a performance page of an aeroplane: speeds, glide, climb, turns, stability and natural modes."""
+    from scenarios.harness.commands import aircraft as command
 
-    with reporting(json_) as report:
-        with usage():
-            check_file(picture)
-            handbook.check_picture(picture)
-            book = handbook.make(name)
-        if picture is not None:
-            from scenarios.harness.commands import aircraft_picture as handbook_picture
-
-            with attempt():
-                handbook_picture.draw(book, picture)
-        report(book.to_json())
-        handbook.tell(book)  # last: a reader who closes the pipe loses no file
+    command.run(name, picture, json_)
 
 
 @app.command()
@@ -478,39 +324,17 @@ def sensors(
     part: Annotated[
         str | None,
         typer.Argument(
-            help="Name of a part or of a suite, or part.toml with one's own; all, where none.",
+            help="Name of a part or of a suite, or your own part.toml; all by default.",
             autocompletion=complete.suites_and_parts,
         ),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(metavar="FILE", help="Draw the page, as PNG, SVG or PDF.")] = None,
+    picture: PictureOption = None,
     json_: JsonOption = None,
 ) -> None:
-    """What sensors there are, or the page of one: its data sheet, its Allan deviation, what it does to a signal."""
-    from scenarios.harness.commands import sensor_names
+    """List the sensors, or print the page of one: its data sheet, its Allan deviation, what it does to a signal."""
+    from scenarios.harness.commands import sensor_names as command
 
-    with reporting(json_) as report:
-        if part is None:
-            if picture is not None:
-                raise refusal(f"--picture {picture}: name the part or the suite to draw")
-            report(sensor_names.to_json())
-            sensor_names.tell()
-            return
-        from scenarios.harness.commands import sensors as sensor_page
-
-        with usage():
-            check_file(picture)
-            sensor_page.check_picture(picture)
-            subject = sensor_names.subject(part)
-            sensor_page.check_rates(subject, part)
-        with console.progress("lying still", "axis-hours") as advance:
-            page = sensor_page.make(subject, advance)
-        if picture is not None:
-            from scenarios.harness.commands import sensors_picture as sensor_picture
-
-            with attempt():
-                sensor_picture.draw(page, picture)
-        report(page.to_json())
-        sensor_page.tell(page)  # last: a reader who closes the pipe loses no file
+    command.run(part, picture, json_)
 
 
 @app.command()
@@ -528,19 +352,10 @@ def export(
     ] = None,
     json_: JsonOption = None,
 ) -> None:
-    """A recording for other programs: its GPS fixes as messages of a receiver, all of it as a text log."""
-    with reporting(json_) as report:
-        with usage():
-            from scenarios.harness.commands import export as exporting
-            from scenarios.harness.commands import view as viewing
+    """Write a recording for other programs: its GPS fixes as receiver messages, all of it as a text log."""
+    from scenarios.harness.commands import export as command
 
-            for path in (nmea, ubx, csv, exporting.map_of(csv) if csv is not None else None):
-                check_file(path)
-            done = exporting.make(flight or viewing.newest(FLIGHTS), nmea, ubx, exporting.parse_start(start), csv)
-        for path, data in done.files.values():
-            write(path, partial(bytes, data))
-        report(done.to_json())
-        exporting.tell(done)  # last: a reader who closes the pipe loses no file
+    command.run(flight, FLIGHTS, nmea, ubx, csv, start, json_)
 
 
 @app.command()
@@ -551,8 +366,6 @@ def view(
     web: WebOption = False,
 ) -> None:
     """Open a recording in the Rerun viewer."""
-    from scenarios.harness.commands import view as viewing
+    from scenarios.harness.commands import view as command
 
-    with usage():
-        shown = viewing.open_flight(flight or viewing.newest(FLIGHTS), web=web)
-    viewing.stay(shown)
+    command.run(flight, FLIGHTS, web=web)

@@ -1,6 +1,9 @@
 """The options that several commands take, and what they change in the configuration of a flight."""
 
+import inspect
 import os
+from collections.abc import Callable
+from functools import partial, wraps
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -107,6 +110,10 @@ FlightTimeoutOption = Annotated[
         parser=number_in(0.001, 1e6, "s"),
     ),
 ]
+PictureOption = Annotated[Path | None, typer.Option("--picture", metavar="FILE", help="Draw it, as PNG, SVG or PDF.")]
+NoRerunOption = Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")]
+OutOption = Annotated[Path, typer.Option("--out", help="Folder for the recordings.")]
+SeedsOption = Annotated[str, typer.Option("--seeds", metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")]
 LedgerOption = Annotated[
     Path | None,
     typer.Option("--ledger", metavar="FOLDER", help="Keep each verdict there as it comes, and fly what is missing."),
@@ -159,9 +166,63 @@ WithholdOption = Annotated[
     ),
 ]
 
+Changes = Callable[[], dict[str, Any]]  # what the options change in the configuration; ValueError if they cannot
+
+
+def flight_options(
+    wind: WindOption = None,
+    shear: ShearOption = None,
+    gust: GustOption = None,
+    turbulence: TurbulenceOption = None,
+    thermals: ThermalsOption = None,
+    aircraft: AircraftOption = None,
+    autopilot: AutopilotOption = None,
+    gps_rate: GpsRateOption = None,
+    imu_rate: ImuRateOption = None,
+    sensors: SensorsOption = None,
+    fault: FaultOption = None,
+    set_: SetOption = None,
+    withhold: WithholdOption = None,
+) -> dict[str, Any]:
+    """The options of every command that flies, as changes of the configuration by dotted names."""
+    named = {
+        "aircraft": aircraft,
+        "autopilot": autopilot,
+        "rates.gps_hz": gps_rate,
+        "rates.imu_hz": imu_rate,
+        "suite": sensors,
+        "faults": fault or None,
+        "withheld": withhold,
+        "wind": wind,
+        "air.shear": shear,
+        "air.gusts": gust or None,
+        "air.turbulence_w20_m_s": turbulence,
+        "air.thermals": thermals,
+    }
+    return changes_of(set_) | given(named)
+
+
+def flies(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the `flight_options` in place of its parameter ``changes``, which is handed a `Changes`."""
+    own, shared = inspect.signature(command), inspect.signature(flight_options)
+    parameters = [
+        each
+        for parameter in own.parameters.values()
+        for each in (shared.parameters.values() if parameter.name == "changes" else (parameter,))
+    ]
+
+    @wraps(command)
+    def with_options(**options: Any) -> Any:
+        mine = {name: options.pop(name) for name in shared.parameters}
+        return command(**options, changes=partial(flight_options, **mine))
+
+    with_options.__signature__ = own.replace(parameters=parameters)  # type: ignore[attr-defined]
+    with_options.__annotations__ = {p.name: p.annotation for p in parameters} | {"return": own.return_annotation}
+    return with_options
+
 
 def time_limit(flight_timeout: float | None, *, live: bool = False) -> float | None:
-    """What ``--flight-timeout`` says; where it says nothing, none for a flight that is watched as it is flown."""
+    """The value of ``--flight-timeout``; by default none for a flight that is watched as it is flown."""
     return flight_timeout if flight_timeout is not None or live else FLIGHT_TIMEOUT_S
 
 
@@ -176,30 +237,13 @@ def changes_of(assignments: list[str] | None) -> dict[str, Any]:
     return changes
 
 
-def fitted(
-    aircraft: str | None, autopilot: str | None, gps_hz: float | None, imu_hz: int | None, suite: str | None,
-    faults: list[str] | None,
-) -> dict[str, Any]:  # fmt: skip
-    """What flies, what it carries and what of that fails, by the names of the configuration."""
-    named = {"aircraft": aircraft, "autopilot": autopilot, "rates.gps_hz": gps_hz, "rates.imu_hz": imu_hz}
-    return given(named | {"suite": suite, "faults": faults or None})
-
-
 def given(named: dict[str, Any]) -> dict[str, Any]:
     """Those of `named` that were given on the command line."""
     return {name: value for name, value in named.items() if value is not None}
 
 
-def air(
-    wind: str | None, shear: str | None, gust: list[str] | None, turbulence: str | None, thermals: str | None
-) -> dict[str, Any]:
-    """Overrides of the options about the air."""
-    named = {"wind": wind, "air.shear": shear, "air.gusts": gust or None}
-    return given(named | {"air.turbulence_w20_m_s": turbulence, "air.thermals": thermals})
-
-
 def names_of(text: str | None, option: str) -> list[str]:
-    """Names of a list with commas, none where the option was not given; refused where one of them is empty."""
+    """Names of a list with commas, none if the option was not given; refused if one of them is empty."""
     names = [name.strip() for name in text.split(",")] if text is not None else []
     if not all(names):
         raise refusal(f"{option} {brief(text)}: an empty name; write names with commas between them")

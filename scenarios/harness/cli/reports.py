@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+PICTURES = (".png", ".svg", ".pdf")  # formats that can be drawn
+
+
 @contextmanager
 def usage() -> Iterator[None]:
     """What is refused inside the block is the user's to mend: one line, exit code 2."""
@@ -160,6 +163,13 @@ def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
                 temporary.write_bytes(data)
         except RecordingError as error:
             raise RecordingError(str(error).replace(str(target), str(path))) from error
+
+
+def check_picture(path: Path | None) -> None:
+    """Refuse, before anything is computed, a picture that could not be written or drawn in the format of its name."""
+    check_file(path)
+    if path is not None and path.suffix.lower() not in PICTURES:
+        raise refusal(f"--picture {path}: end the name in {', '.join(PICTURES)}")
 
 
 def write_figure(path: Path, figure: "Figure", dpi: int) -> None:

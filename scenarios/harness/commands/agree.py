@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import reporting, usage
 from sim.outside.wording import brief
 
 RELATIVE = 0.05  # of the larger of the two values, and besides
@@ -210,7 +211,7 @@ def _absolute(tolerance: float) -> dict[str, float]:
     return {unit: amount * tolerance / RELATIVE for unit, amount in ABSOLUTE.items()}
 
 
-def tell(agreement: Agreement) -> None:
+def print_report(agreement: Agreement) -> None:
     """The largest differences, what disagrees otherwise, and the sum."""
     worst = agreement.worst()
     rows = [
@@ -239,3 +240,13 @@ def _word(difference: Difference) -> str:
     if not difference.judged:
         return "reported"
     return "agrees" if difference.agrees else "DISAGREES"
+
+
+def run(first: Path, second: Path, tolerance: float, reported: Sequence[str], json_: str | None) -> int:
+    """Do what the command line asks for; gives the exit code."""
+    with reporting(json_) as report:
+        with usage():
+            compared = compare(read(first), read(second), tolerance, reported)
+        report(compared.to_json())
+        print_report(compared)  # last: a reader who closes the pipe loses no file
+    return compared.exit_code

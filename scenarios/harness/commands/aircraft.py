@@ -12,6 +12,7 @@ from typing import Any
 
 from estimator.interface import G_M_S2
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import attempt, check_picture, reporting, usage
 from sim.aeroplane import performance
 from sim.aeroplane.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.aeroplane.jsbsim_model import Model
@@ -21,7 +22,6 @@ from sim.aeroplane.trim import Trim
 
 PHYSICS_HZ = 200
 HEIGHT_M = 60.0
-FORMATS = (".png", ".svg", ".pdf")
 TITLES = {
     "short_period": "short period",
     "phugoid": "phugoid",
@@ -108,12 +108,6 @@ def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
     return Handbook(name, model, frame, p, linear, modes(linear), textbook(linear), simple, derivatives)
 
 
-def check_picture(path: Path | None) -> None:
-    """Refuse, before anything is computed, a picture in a format that cannot be drawn."""
-    if path is not None and path.suffix.lower() not in FORMATS:
-        raise ValueError(f"--picture {path}: end the name in {', '.join(FORMATS)}")
-
-
 def glide_ratio(t: Trim) -> float:
     return -1.0 / math.tan(t.climb_rad)
 
@@ -156,7 +150,7 @@ def _turn_json(t: Trim) -> dict[str, float]:
     }
 
 
-def tell(book: Handbook) -> None:
+def print_report(book: Handbook) -> None:
     """Print the page."""
     out, f = console.out(), book.frame
     loading = f"{10.0 * f.mass_kg / f.area_m2:.1f} g/dm2"
@@ -275,3 +269,18 @@ def _derivatives(book: Handbook) -> Any:
     cells += [("", "")] * (3 * third - len(cells))
     rows = [[*cells[i], *cells[i + third], *cells[i + 2 * third]] for i in range(third)]
     return console.table("Derivatives, per rad and per full deflection", [""] * 6, rows, text=(0, 2, 4))
+
+
+def run(name: str, picture: Path | None, json_: str | None) -> None:
+    """Do what the command line asks for."""
+    with reporting(json_) as report:
+        with usage():
+            check_picture(picture)
+            book = make(name)
+        if picture is not None:
+            from scenarios.harness.commands import aircraft_picture
+
+            with attempt():
+                aircraft_picture.draw(book, picture)
+        report(book.to_json())
+        print_report(book)  # last: a reader who closes the pipe loses no file

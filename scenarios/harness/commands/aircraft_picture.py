@@ -16,12 +16,11 @@ from matplotlib.figure import Figure
 from estimator.interface import G_M_S2
 from scenarios.harness.cli.reports import write_figure
 from scenarios.harness.commands.aircraft import MODE_HEADINGS, TITLES, Handbook, figures, glide_ratio, mode_rows
+from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
 from sim.aeroplane.linear import Mode, linearise, modes
 from sim.aeroplane.performance import radius_m
 from sim.aeroplane.trim import Trim, trim
 
-INK, FAINT, GRID = "#1f2933", "#7b8794", "#e4e7eb"
-BLUE, ORANGE, GREEN, RED, VIOLET, TEAL = "#2563a8", "#d9730d", "#3a8f4d", "#c0392b", "#7d52a0", "#16858c"
 COLOURS = {
     "short_period": BLUE,
     "phugoid": TEAL,
@@ -30,31 +29,7 @@ COLOURS = {
     "spiral": VIOLET,
     "roll_spiral": VIOLET,
 }
-STYLE: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "text.color": INK,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.titlesize": 10.5,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": GRID,
-    "grid.linewidth": 0.8,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "lines.linewidth": 1.8,
-}
 LOCUS_SPEEDS = 13
-DPI = 150
 
 
 def draw(book: Handbook, path: Path) -> None:

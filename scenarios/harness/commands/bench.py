@@ -21,8 +21,10 @@ from estimator.instruments import Instruments
 from estimator.interface import AttitudeEstimator, Measurements
 from scenarios.harness.checks import Row
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.gate import guard
 from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
+from scenarios.harness.timing import least_ns
 from scenarios.harness.verdict import FAILED, SIMULATION_FAILED
 from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.clock import Rates
@@ -185,7 +187,7 @@ class Cruise:
             command = command_of(autopilot, estimate, measured, self.setpoint, self.log.flown, k)
             for i, spent in enumerate((t1 - t0, t2 - t1, t3 - t2, clock() - t3)):
                 total[i] += spent
-        per_reading = _least_ns(lambda: [clock() for _ in range(1000)]) / 1000
+        per_reading = least_ns(lambda: [clock() for _ in range(1000)]) / 1000
         return {
             stage: (spent / len(self.log) - per_reading) / _NS_PER_US
             for stage, spent in zip(STAGES, total, strict=True)
@@ -203,7 +205,7 @@ class Cruise:
                 update(m)
 
         with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
-            return _least_ns(run) / len(inputs)
+            return least_ns(run) / len(inputs)
 
     def kernel_ns(self) -> float | None:
         """The kernel over the same measurements in one call, nanoseconds a tick; None where there is none."""
@@ -211,18 +213,7 @@ class Cruise:
         rows = self.log.measured.copy()
         with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
             replay = getattr(estimator, "replay", None)
-            return None if replay is None else _least_ns(lambda: replay(rows)) / len(rows)
-
-
-def _least_ns(run: Callable[[], Any], repeats: int = 7) -> float:
-    """Least time of several calls, after one that does not count."""
-    run()
-    times = []
-    for _ in range(repeats):
-        begin_ns = perf_counter_ns()
-        run()
-        times.append(perf_counter_ns() - begin_ns)
-    return float(min(times))
+            return None if replay is None else least_ns(lambda: replay(rows)) / len(rows)
 
 
 def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
@@ -265,7 +256,7 @@ def _measured(estimator: str, seconds: float, repeats: int, advance: Callable[[i
     )
 
 
-def tell(speed: Speed) -> None:
+def print_report(speed: Speed) -> None:
     """The figures, and where the time goes."""
     out = console.out()
     out.print(console.verdict_table("speed in still air", speed.rows))
@@ -279,3 +270,18 @@ def tell(speed: Speed) -> None:
             f"(least over least {speed.ratio:.2f})"
         )
     )
+
+
+def run(estimator: str, seconds: float, repeats: int, json_: str | None) -> int:
+    """Do what the command line asks for; gives the exit code."""
+    with reporting(json_) as report:
+        try:
+            with usage(), console.progress("measuring", "pairs") as advance:
+                speed = measure(estimator, seconds, repeats, advance)
+        except NotTimed as problem:
+            report({"passed": False, "estimator": estimator, "failure": str(problem)})
+            console.error(str(problem))
+            return problem.exit_code
+        print_report(speed)
+        report(speed.to_json())
+    return 0 if speed.passed else 1

@@ -4,25 +4,29 @@ A flight is decided by its scenario, its overrides and its seed alone, and the v
 in which the flights were named, so neither the number of workers nor their speed shows in the result.
 """
 
-import re
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from scenarios.harness.cli import console
 from scenarios.harness.cli import reports as cli_reports
-from scenarios.harness.config import LARGEST_SEED
+from scenarios.harness.cli.options import Changes
+from scenarios.harness.cli.reports import check_file, reporting, usage, write
 from scenarios.harness.flight import fly_scenario, prepare
+from scenarios.harness.gate import guard
 from scenarios.harness.gate.ledger import Ledger
+from scenarios.harness.gate.preparing import in_time
 from scenarios.harness.gate.sources import decided_by, fingerprint
-from scenarios.harness.gate.workers import fly_each
+from scenarios.harness.gate.workers import fly_each, processors
 from scenarios.harness.registry import find, matching
+from scenarios.harness.seeds import parse_seeds
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Outcome
 
-MOST_SEEDS, MOST_FLIGHTS = 10_000, 100_000  # of one command
+MOST_FLIGHTS = 100_000  # of one command
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +71,7 @@ def tasks(
     """
     wanted, left_out = matching(names or ["*"]), []
     if estimator is not None:
-        left_out = [name for name in wanted if name not in names and find(name).shows_failure]
+        left_out = [name for name in wanted if name not in names and find(name).expected_to_fail]
         wanted = [name for name in wanted if name not in left_out]
         if not wanted:
             raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
@@ -88,7 +92,7 @@ def tasks(
     return found
 
 
-def tell(verdict: Verdict) -> None:
+def print_report(verdict: Verdict) -> None:
     """The pooled tables, then the flights that failed, each on a line."""
     out = console.out()
     for pool in verdict.pooled:
@@ -105,28 +109,6 @@ def tell(verdict: Verdict) -> None:
     flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))
     missing = f"; {verdict.missing_text}" if verdict.missing else ""
     console.last(f"passed: {flights} flights, {pooled} scenarios pooled{missing}")
-
-
-def parse_seeds(text: str) -> list[int]:
-    """Seeds of what a person types: ``0-9``, ``3``, ``0,2,5-7``; each once, in that order.
-
-    Raises
-    ------
-    ValueError      naming what would be right
-    """
-    right = "write numbers and ranges, for instance 0-9 or 0,2,5-7"
-    seeds: dict[int, None] = {}
-    for part in text.split(","):
-        found = re.fullmatch(r" *([0-9]{1,20})(?:-([0-9]{1,20}))? *", part)
-        if not found:
-            raise ValueError(f"seeds = {text!r}: {right}")
-        first, last = int(found[1]), int(found[2] or found[1])
-        if not first <= last <= LARGEST_SEED:
-            raise ValueError(f"seeds = {text!r}: {part.strip()} is no range of seeds from 0 to {LARGEST_SEED}; {right}")
-        if last - first + len(seeds) >= MOST_SEEDS:
-            raise ValueError(f"seeds = {text!r}: more than {MOST_SEEDS} at once are too many; split them")
-        seeds |= dict.fromkeys(range(first, last + 1))
-    return list(seeds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,3 +174,37 @@ def fly_all(
     done |= {missing[k]: verdict for k, verdict in flown.items()}
     verdict = Verdict.of(((find(tasks[i].scenario), done[i]) for i in sorted(done)), len(tasks) - len(done))
     return Run(verdict, len(flown), resumed, len(tasks) - len(done), time.monotonic() - began_s)
+
+
+def run(
+    names: Sequence[str],
+    seeds: str,
+    estimator: str | None,
+    changes: Changes,
+    *,
+    workers: int | None,
+    limit_s: float | None,
+    ledger: Path | None,
+    junit: Path | None,
+    markdown: Path | None,
+    json_: str | None,
+) -> int:
+    """Do what the command line asks for; gives the exit code."""
+    with reporting(json_) as report:
+        with usage():
+            for path in (junit, markdown):
+                check_file(path)
+            changed = changes()
+            if "seed" in changed:
+                raise ValueError(f"--set seed={changed['seed']}: name the seeds to fly with --seeds")
+            with in_time(limit_s):
+                planned = tasks(names, parse_seeds(seeds), estimator, changed, keyed=ledger is not None)
+            kept = None if ledger is None else Ledger(ledger)
+            guard.stage("while it judged", guard.BROKEN)
+            with console.progress("flying", "flights") as advance:
+                done = fly_all(planned, workers or processors(), advance, limit_s=limit_s, ledger=kept)
+        write(junit, done.verdict.to_junit)
+        write(markdown, done.verdict.to_markdown)
+        report(done.to_json())
+        print_report(done.verdict)  # last: a reader who closes the pipe loses no report
+    return done.exit_code

@@ -10,25 +10,35 @@ import math
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from time import perf_counter_ns
+from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
-from rich.text import Text
 
 from estimator import ESTIMATORS
-from estimator.instruments import Instruments, Known, to_json
-from estimator.interface import Array, HeadingReference, Measurements
+from estimator.instruments import Instruments
+from estimator.interface import HeadingReference
 from scenarios.harness.cli import console
+from scenarios.harness.cli.options import Changes
+from scenarios.harness.cli.reports import attempt, check_file, check_picture, reporting, usage, write
+from scenarios.harness.commands.comparison import (
+    FLIGHT_CODE_FAILED,
+    LETTERS,
+    NO_SERIES,
+    Comparison,
+    Entrant,
+    Traced,
+    print_report,
+)
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import Prepared, fly_scenario, prepare_config
 from scenarios.harness.flight import prepare as prepare_flight
-from scenarios.harness.gate.workers import fly_each
-from scenarios.harness.metrics import Series, heading_error_deg, inclination_error_deg, rms
+from scenarios.harness.gate import guard
+from scenarios.harness.gate.preparing import in_time
+from scenarios.harness.gate.workers import fly_each, processors
+from scenarios.harness.metrics import heading_error_deg, inclination_error_deg
 from scenarios.harness.plugins import (
     PluginError,
-    equipped,
     load_estimator,
     shared_settings,
     uses_of,
@@ -36,26 +46,14 @@ from scenarios.harness.plugins import (
 )
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
-from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, judge
+from scenarios.harness.seeds import parse_seeds
+from scenarios.harness.timing import Cost, NotTimed, cost
+from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Outcome
-from sim.outside.blame import home_of, theirs
-from sim.outside.wording import markdown, printable
 
-FLIGHT_CODE_FAILED = {Outcome.ESTIMATOR_FAILED, Outcome.TIMED_OUT, Outcome.WORKER_DIED}
-LETTERS = {"gyro": "G", "accelerometer": "A", "gps": "P", "magnetometer": "M", "airspeed": "V"}
-TIMED_S, TIMED_REPEATS, TIMED_MOST_NS = 4.0, 7, 1_000_000_000
+TIMED_S = 4.0
 PREFIX = "estimator_params."
-NO_SERIES = Series(np.empty(0), np.empty(0), np.empty(0, np.bool_))
 _UNKNOWN = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")  # of a class that does not say
-
-
-@dataclass(frozen=True, slots=True)
-class Traced:
-    """One flight of the comparison: the verdict on it, and its errors over time, for pooling and drawing."""
-
-    verdict: FlightVerdict
-    inclination: Series
-    heading: Series
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,169 +76,6 @@ class Task:
         """What is to be known of it where nothing came back."""
         name = find(self.scenario).name
         return Traced(FlightVerdict(name, self.estimator, self.seed, outcome, (), {}, message), NO_SERIES, NO_SERIES)
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """What one update costs, ns: a call of `update`, and of a whole log in one call where there is a `replay`.
-
-    failure : one line on what was raised while it was timed
-    """
-
-    update_ns: float
-    replay_ns: float | None
-    failure: str = ""
-
-    @property
-    def ns(self) -> float:
-        """The less of the two."""
-        return self.update_ns if self.replay_ns is None else self.replay_ns
-
-
-@dataclass(frozen=True, slots=True)
-class Entrant:
-    """One estimator of the comparison: what it is given, and how its flights went.
-
-    given : the instruments that it uses and that are fitted       n_planned : flights it was to fly
-    pooled : the scenario's checks over all its flights; None where none was flown      timing : None where not measured
-    """
-
-    name: str
-    given: tuple[str, ...]
-    heading_reference: HeadingReference
-    n_planned: int
-    flights: tuple[Traced, ...]
-    pooled: PooledVerdict | None
-    timing: Cost | None = None
-
-    @property
-    def cost(self) -> Cost | None:
-        """What an update costs; None where it was not measured, or failed."""
-        return None if self.timing is None or self.timing.failure else self.timing
-
-    @property
-    def known(self) -> dict[str, Known]:
-        """What it was given of the instruments; of what it learnt, the median over its flights."""
-        if not self.flights:
-            return {}
-        each = [flown.verdict.known for flown in self.flights]
-        values = {name: [k[name].value for k in each if k[name].source == "learnt"] for name in each[0]}
-        return {
-            name: Known(float(np.median(values[name])), "learnt") if values[name] else entry
-            for name, entry in each[0].items()
-        }
-
-    @property
-    def survived(self) -> int:
-        """Flights that lasted as long as planned."""
-        return sum(f.verdict.outcome == Outcome.COMPLETED for f in self.flights)
-
-    @property
-    def checks_passed(self) -> int:
-        """Pooled checks of the scenario that it passes."""
-        return sum(row.passed for row in self.pooled.rows) if self.pooled else 0
-
-    @property
-    def numbers(self) -> dict[str, float]:
-        """Its errors: RMS as the root of the mean square over flights, the others over all samples of all flights."""
-        inclination = [f.inclination.judged_values for f in self.flights]
-        heading = [f.heading.judged_values for f in self.flights]
-        return {
-            "inclination_rms_deg": _pooled_rms(inclination),
-            "inclination_p95_deg": _over_all(inclination, lambda v: float(np.percentile(v, 95.0))),
-            "inclination_max_deg": _over_all(inclination, lambda v: float(np.max(v))),
-            "heading_rms_deg": _pooled_rms(heading),
-        }
-
-    def to_json(self) -> dict[str, Any]:
-        """Its line as plain data; what could not be measured is None."""
-        return {
-            "estimator": self.name,
-            "given": list(self.given),
-            "known": to_json(self.known),
-            "heading_reference": self.heading_reference,
-            "flights": len(self.flights),
-            "survived": self.survived,
-            **{name: value if math.isfinite(value) else None for name, value in self.numbers.items()},
-            "update_ns": self.cost.update_ns if self.cost else None,
-            "replay_ns": self.cost.replay_ns if self.cost else None,
-            **({"failure": self.timing.failure} if self.timing and self.timing.failure else {}),
-            "checks": len(self.pooled.rows) if self.pooled else 0,
-            "checks_passed": self.checks_passed,
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """What is printed, drawn and written."""
-
-    scenario: Scenario
-    config: FlightConfig
-    seeds: tuple[int, ...]
-    entrants: tuple[Entrant, ...]
-    notes: tuple[str, ...] = ()
-
-    @property
-    def whole(self) -> bool:
-        """Whether every flight that was planned was finished."""
-        return all(len(e.flights) == e.n_planned for e in self.entrants)
-
-    @property
-    def exit_code(self) -> int:
-        """As of the command line.
-
-        0 where all flew, 1 where flight code or the scenario's own functions failed, 3 where a simulation blew up, 130
-        where it was interrupted
-        """
-        outcomes = {f.verdict.outcome for e in self.entrants for f in e.flights}
-        if not self.whole:
-            return console.INTERRUPTED
-        if Outcome.DIVERGED in outcomes:
-            return 3
-        not_timed = any(e.timing is not None and e.timing.failure for e in self.entrants)
-        raised = any(row.raised for e in self.entrants for f in e.flights for row in f.verdict.rows)
-        failed = outcomes & {*FLIGHT_CODE_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.SCENARIO_FAILED}
-        return 1 if failed or not_timed or raised else 0
-
-    def to_json(self) -> dict[str, Any]:
-        """All of it as plain data: a line per estimator, and the verdict on every flight as `check` writes it."""
-        verdicts = Verdict(tuple(f.verdict for e in self.entrants for f in e.flights), ()).to_json()["flights"]
-        return {
-            "scenario": self.scenario.name,
-            "seeds": list(self.seeds),
-            "estimators": [e.to_json() for e in self.entrants],
-            "notes": list(self.notes),
-            "flights": verdicts,
-        } | ({} if self.whole else {"interrupted": True})
-
-    def to_markdown(self) -> str:
-        """The table as Markdown."""
-        headings = (
-            "estimator", "given", "survived", "inclination RMS, deg", "p95", "max", "heading RMS, deg", "against",
-            "update(), ns", "replay, ns", "checks passed",
-        )  # fmt: skip
-        lines = [f"# {markdown(title(self))}", "", f"| {' | '.join(headings)} |", "|-|-|" + "-:|" * 5 + "-|-:|-:|-:|"]
-        for e in self.entrants:
-            n = e.numbers
-            costs = (e.cost.update_ns, e.cost.replay_ns) if e.cost else (None, None)
-            cells = [
-                markdown(e.name), ", ".join(e.given), f"{e.survived} of {len(e.flights)}",
-                *map(console.number, n.values()),
-                e.heading_reference, *("" if c is None else f"{c:.0f}" for c in costs), checks_text(e),
-            ]  # fmt: skip
-            lines.append(f"| {' | '.join(cells)} |")
-        return "\n".join(lines) + "\n"
-
-
-def title(comparison: Comparison) -> str:
-    """What was flown, in a line."""
-    n = len(comparison.seeds)
-    return f"{comparison.scenario.name}, {n} {'seed' if n == 1 else 'seeds'}"
-
-
-def checks_text(entrant: Entrant) -> str:
-    """How many of the scenario's checks it passes."""
-    return f"{entrant.checks_passed}/{len(entrant.pooled.rows)}" if entrant.pooled else "none"
 
 
 @dataclass(frozen=True, slots=True)
@@ -364,7 +199,7 @@ class _Timing:
         """Measure it; its flights are kept where it raises."""
         try:
             return cost(self.estimator, *_measured(self.scenario, self.config))
-        except (_NotTimed, ValueError) as problem:  # the latter of a script that asks for a longer flight
+        except (NotTimed, ValueError) as problem:  # the latter of a script that asks for a longer flight
             return Cost(math.nan, None, str(problem))
 
     def lost(self, outcome: Outcome, message: str) -> Cost:
@@ -389,86 +224,34 @@ def _costs(plan: Plan, failed: Container[str], limit_s: float | None) -> dict[st
     return {timed[i]: measured for i, measured in found.items()}
 
 
-class _NotTimed(RuntimeError):
-    """An estimator that raised while it was timed."""
+def run(
+    scenario: str,
+    estimators: Sequence[str],
+    seeds: str,
+    changes: Changes,
+    *,
+    workers: int | None,
+    limit_s: float | None,
+    picture: Path | None,
+    markdown: Path | None,
+    json_: str | None,
+) -> int:
+    """Do what the command line asks for; gives the exit code."""
+    with reporting(json_) as report:
+        with usage():
+            check_picture(picture)
+            check_file(markdown)
+            with in_time(limit_s):
+                plan = prepare(scenario, estimators, parse_seeds(seeds), changes())
+            guard.stage("while it compared", guard.BROKEN)
+            with console.progress("flying", "flights") as advance:
+                compared = fly(plan, workers or processors(), advance, limit_s=limit_s)
+        if picture is not None:
+            from scenarios.harness.commands import compare_picture
 
-
-def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
-    """Least time of several passes over `rows`, per row; a slow one is timed over fewer of them."""
-    rows = rows.copy()  # an estimator may write into them
-    inputs = [Measurements(rows, k) for k in range(len(rows))]
-    estimator = equipped(name, instruments).code
-
-    def stream() -> None:
-        update = estimator.update
-        for m in inputs:
-            update(m)
-
-    with theirs(_NotTimed, home_of(estimator)):
-        replay, update_ns = getattr(estimator, "replay", None), _least_ns(stream) / len(rows)
-        return Cost(update_ns, None if replay is None else _least_ns(lambda: replay(rows)) / len(rows))
-
-
-def _least_ns(run: Callable[[], Any]) -> float:
-    """Least time of several calls after one that does not count; of one that is slow, fewer."""
-    run()
-    times: list[int] = []
-    while len(times) < TIMED_REPEATS and sum(times) < TIMED_MOST_NS:
-        begin_ns = perf_counter_ns()
-        run()
-        times.append(perf_counter_ns() - begin_ns)
-    return float(min(times))
-
-
-def _pooled_rms(values: Sequence[Array]) -> float:
-    each = np.array([rms(v) for v in values if len(v)])
-    return rms(each)
-
-
-def _over_all(values: Sequence[Array], reduce: Callable[[Array], float]) -> float:
-    joined = np.concatenate(values) if values else np.empty(0)
-    return reduce(joined) if len(joined) else math.nan
-
-
-_HEADINGS = (
-    "", "given", "inclination error\n  RMS   p95   max", "heading\nRMS", "us per\nupdate", "lasted,\nchecks",
-)  # fmt: skip
-
-
-def tell(comparison: Comparison) -> None:
-    """The table, what its letters mean, and the flights that did not end as planned."""
-    out = console.out()
-    rows = [_row(entrant) for entrant in comparison.entrants]
-    out.print(console.table(title(comparison), _HEADINGS, rows, text=(0, 1), wrapping=(0,)))
-    present = dict.fromkeys(name for e in comparison.entrants for name in e.given)
-    letters = ", ".join(f"{letter} {name}" for name, letter in LETTERS.items() if name in present)
-    out.print(
-        Text(
-            f"given: {letters}\nerrors in degrees; heading: c against the course over ground, n against the nose\n"
-            "us per update: over a log in one call; * each update() called from Python\n"
-            "lasted: flights that did not end early; checks: of the scenario, passed over all seeds",
-            "dim",
-        )
-    )
-    for line in comparison.notes:
-        console.line(f"note        {line}")
-    console.print_known({entrant.name: entrant.known for entrant in comparison.entrants})
-    for entrant in comparison.entrants:
-        if entrant.timing is not None and entrant.timing.failure:
-            console.line(f"{entrant.name}, while it was timed: {entrant.timing.failure}", "red")
-        for flown in entrant.flights:
-            v = flown.verdict
-            if v.outcome != Outcome.COMPLETED or any(row.raised for row in v.rows):
-                at = f" at {v.metrics.get('flown_s') or 0.0:.1f} s" if v.rows else ""
-                why = f"{v.outcome.replace('_', ' ')}{at}" + (f": {v.message}" if v.message else "")
-                console.line(f"{entrant.name}, seed {v.seed}: {why}", "red")
-
-
-def _row(e: Entrant) -> list[str]:
-    """A line of the table: numbers that belong together in one cell, so that it fits 80 columns."""
-    n = e.numbers
-    inclination = f"{n['inclination_rms_deg']:5.2f} {n['inclination_p95_deg']:5.1f} {n['inclination_max_deg']:5.1f}"
-    heading = f"{n['heading_rms_deg']:.1f} {e.heading_reference[0]}"
-    letters = "".join(LETTERS[name] for name in e.given)
-    spent = "" if e.cost is None else f"{e.cost.ns / 1000.0:.2f}{'' if e.cost.replay_ns else '*'}"
-    return [printable(e.name), letters, inclination, heading, spent, f"{e.survived}/{len(e.flights)} {checks_text(e)}"]
+            with attempt():
+                compare_picture.draw(compared, picture)
+        write(markdown, compared.to_markdown)
+        report(compared.to_json())
+        print_report(compared)  # last: a reader who closes the pipe loses no report
+    return compared.exit_code

@@ -16,7 +16,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from estimator.interface import Array
 from scenarios.harness.cli.reports import write_figure
-from scenarios.harness.commands.aircraft_picture import (
+from scenarios.harness.commands.comparison import LETTERS, Comparison, Entrant, checks_text
+from scenarios.harness.metrics import Series, p95, rms
+from scenarios.harness.picture_style import (
     BLUE,
     DPI,
     FAINT,
@@ -29,8 +31,6 @@ from scenarios.harness.commands.aircraft_picture import (
     TEAL,
     VIOLET,
 )
-from scenarios.harness.commands.compare import LETTERS, Comparison, Entrant, checks_text
-from scenarios.harness.metrics import Series, p95, rms
 from sim.outside.wording import plotted
 
 COLOURS = (
@@ -77,7 +77,7 @@ def _heading(figure: Any, comparison: Comparison, height: float) -> None:
     )
     wind = f"wind {config.air.wind_m_s:g} m/s, turbulence W20 {config.air.turbulence_w20_m_s:g} m/s"
     facts = (
-        plotted(comparison.scenario.told_as, 120),
+        plotted(comparison.scenario.summary, 120),
         f"{n} {'seed' if n == 1 else 'seeds'}, the same for each",
         plotted(config.aircraft.replace("_", " ")),
         f"sensors {plotted(Path(config.suite).stem)}",

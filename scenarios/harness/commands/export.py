@@ -5,11 +5,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import check_file, reporting, usage, write
 from scenarios.harness.commands import export_text
+from scenarios.harness.commands.view import newest
 from sim import gps_messages, recording
 from sim.gps_messages import Accuracy, Fixes
 from sim.log import Flight
@@ -140,7 +143,7 @@ def accuracy_of(flight: Flight) -> Accuracy:
     return Accuracy(both_axes_m, vertical_m, math.hypot(gps.velocity_noise_m_s, gps.velocity_wander_m_s))
 
 
-def tell(export: Export) -> None:
+def print_report(export: Export) -> None:
     """Print the table."""
     first_t_s, last_t_s = _span(export.fixes)
     times = ["none" if t is None else f"{export.utc(t):%H:%M:%S.%f}"[:-3] for t in (first_t_s, last_t_s)]
@@ -158,3 +161,24 @@ def _span(fixes: Fixes) -> tuple[float | None, float | None]:
     """The first and the last stamp; None where there is none."""
     stamps = [float(t) for t in fixes.t_s if math.isfinite(t)]
     return (min(stamps), max(stamps)) if stamps else (None, None)
+
+
+def run(
+    flight: Path | None,
+    below: Path,
+    nmea: Path | None,
+    ubx: Path | None,
+    csv: Path | None,
+    start: str | None,
+    json_: str | None,
+) -> None:
+    """Do what the command line asks for, with `flight` or the newest `below` that folder."""
+    with reporting(json_) as report:
+        with usage():
+            for path in (nmea, ubx, csv, map_of(csv) if csv is not None else None):
+                check_file(path)
+            done = make(flight or newest(below), nmea, ubx, parse_start(start), csv)
+        for path, data in done.files.values():
+            write(path, partial(bytes, data))
+        report(done.to_json())
+        print_report(done)  # last: a reader who closes the pipe loses no file

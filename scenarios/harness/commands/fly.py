@@ -7,6 +7,8 @@ from typing import Any
 
 from estimator.instruments import to_json
 from scenarios.harness.cli import console
+from scenarios.harness.cli.options import Changes
+from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.commands import view as viewing
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import prepare
@@ -127,7 +129,7 @@ def _warn_if_late(flight: Flight) -> None:
         )
 
 
-def tell(flown: Flown) -> None:
+def print_report(flown: Flown) -> None:
     """The verdict, how the flight ended, and where to see it."""
     out, flight, judged = console.out(), flown.flight, flown.judged
     if flight is None:
@@ -152,3 +154,25 @@ def tell(flown: Flown) -> None:
 def _name(scenario: str, config: FlightConfig) -> str:
     """Name of the folder of a recording."""
     return f"{file_name(scenario)}-{file_name(config.estimator.rpartition(':')[2])}-seed{config.seed}"
+
+
+def run(
+    scenario: str,
+    changes: Changes,
+    into: Path,
+    *,
+    rerun: bool,
+    live: bool,
+    web: bool,
+    limit_s: float | None,
+    json_: str | None,
+) -> int:
+    """Do what the command line asks for; gives the exit code."""
+    with reporting(json_) as report:
+        with usage():
+            flown = fly(scenario, changes(), into, rerun=rerun, live=live, web=web, limit_s=limit_s)
+        report(flown.to_json())
+        print_report(flown)  # last: a reader who closes the pipe loses no report
+    if flown.shown is not None:
+        viewing.stay(flown.shown.viewer)
+    return flown.exit_code

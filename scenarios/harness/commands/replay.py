@@ -1,6 +1,6 @@
 """`wingslevel replay`: a log read, replayed by one estimator or several, recorded and told."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 from estimator.instruments import Instruments, property_names, to_json
 from scenarios.harness import logs
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.gate import guard
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.plugins import shared_settings, without
@@ -27,7 +28,7 @@ _SHOWN = (
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Replays:
     """A log and what the estimators made of it.
 
     folders : their recordings, by name, None where one could not be written
@@ -70,7 +71,7 @@ class Told:
         return {**about, "estimators": each, **alone}
 
 
-def run(
+def replay_log(
     path: Path,
     names: Sequence[str],
     into: Path,
@@ -82,7 +83,7 @@ def run(
     withheld: Sequence[str] = (),
     window: Window | None = None,
     rerun: bool = True,
-) -> Told:
+) -> Replays:
     """Read the log at `path`, replay it with each estimator of `names`, record each below the folder `into`.
 
     params : of all that have them, or, as ``premerlani.gps_latency_s``, of one
@@ -125,7 +126,7 @@ def run(
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
     notes = (*without(of_each, settings), *_ground_too(log))
-    return Told(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
+    return Replays(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
 
 
 def _place(folder: Path | None) -> str | None:
@@ -140,7 +141,7 @@ def _ground_too(log: RecordedLog) -> list[str]:
     return ["none of the fixes is usable: all rows are judged, those on the ground too"]
 
 
-def tell(told: Told) -> None:
+def print_report(told: Replays) -> None:
     """The log, what was repaired in it, the table, and where the recordings are."""
     out, log = console.out(), told.log
     length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
@@ -184,3 +185,19 @@ def _row(replayed: Replayed) -> list[str]:
     """A line of the table: numbers that belong together in one cell, so that it fits 80 columns."""
     cells = [" ".join(f"{console.number(replayed.scores[name]):>6}" for name in names) for names in _SHOWN]
     return [replayed.estimator, *cells, f"{replayed.ns_per_update:.0f}"]
+
+
+def run(
+    log: Path,
+    names: Callable[[], Sequence[str]],
+    into: Path,
+    json_: str | None,
+    options: Callable[[], Mapping[str, Any]],
+) -> int:
+    """Do what the command line asks for, with the `options` of `replay_log`; gives the exit code."""
+    with reporting(json_) as report:
+        with usage():
+            replays = replay_log(log, names(), into, **options())
+        report(replays.to_json())
+        print_report(replays)  # last: a reader who closes the pipe loses no file
+    return replays.exit_code

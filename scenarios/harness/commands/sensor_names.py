@@ -8,6 +8,8 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import attempt, check_picture, refusal, reporting, usage
+from scenarios.harness.commands import sensors
 from scenarios.harness.commands.sensors import Subject
 from sim.params import near_misses
 from sim.sensors.datasheet import KINDS, Part, load_part, part_names, read_text, read_toml
@@ -79,7 +81,7 @@ def _part_json(part: Part) -> dict[str, Any]:
     return about | {"sensors": list(part.devices)}
 
 
-def tell() -> None:
+def print_report() -> None:
     """Print the list."""
     out = console.out()
     rows = []
@@ -97,3 +99,27 @@ def tell() -> None:
 
 def _word(kind: str) -> str:
     return "GPS" if kind == "gps" else kind
+
+
+def run(part: str | None, picture: Path | None, json_: str | None) -> None:
+    """Do what the command line asks for: the list, or the page of `part`."""
+    with reporting(json_) as report:
+        if part is None:
+            if picture is not None:
+                raise refusal(f"--picture {picture}: name the part or the suite to draw")
+            report(to_json())
+            print_report()
+            return
+        with usage():
+            check_picture(picture)
+            about = subject(part)
+            sensors.check_rates(about, part)
+        with console.progress("lying still", "axis-hours") as advance:
+            page = sensors.make(about, advance)
+        if picture is not None:
+            from scenarios.harness.commands import sensors_picture
+
+            with attempt():
+                sensors_picture.draw(page, picture)
+        report(page.to_json())
+        sensors.print_report(page)  # last: a reader who closes the pipe loses no file

@@ -23,7 +23,6 @@ from sim.sensors.trial import (
     Response,
 )
 
-FORMATS: Final = (".png", ".svg", ".pdf")
 DRIFT_S: Final = 60.0
 NAMES: Final = {
     "noise_density": "noise density",
@@ -228,13 +227,7 @@ def _air_effects(kind: str, params: Any, trial: AirTrial) -> list[Row]:
     ]
 
 
-def check_picture(path: Any) -> None:
-    """Refuse, before anything is computed, a picture in a format that cannot be drawn."""
-    if path is not None and path.suffix.lower() not in FORMATS:
-        raise ValueError(f"--picture {path}: end the name in {', '.join(FORMATS)}")
-
-
-def tell(page: Page) -> None:
+def print_report(page: Page) -> None:
     """Print the page."""
     out, about = console.out(), page.subject
     out.print(console.titled(about.name, f"  {about.about}"))

@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 
 from estimator.interface import G_M_S2, Array
 from scenarios.harness.cli.reports import write_figure
-from scenarios.harness.commands.aircraft_picture import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, VIOLET
 from scenarios.harness.commands.sensors import NAMES, Page
+from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, VIOLET
 from sim.log import Log
 from sim.outside.wording import plotted
 from sim.sensors import allan

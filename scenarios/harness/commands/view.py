@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenarios.harness.cli import console
+from scenarios.harness.cli.reports import usage
 from sim import recording
 from sim.log import Flight, Log
 
@@ -88,3 +89,10 @@ def live(prepared: "Prepared", *, web: bool) -> RealTime:
         console.err().print(f"open {viewer.address}", soft_wrap=True)
     view = rerun_view.LiveView(viewer.url, prepared.manifest, config.held_s, prepared.heading_reference)
     return RealTime(viewer, view, config.rates.imu_hz)
+
+
+def run(flight: Path | None, below: Path, *, web: bool) -> None:
+    """Do what the command line asks for: open `flight`, or the newest `below` that folder."""
+    with usage():
+        shown = open_flight(flight or newest(below), web=web)
+    stay(shown)

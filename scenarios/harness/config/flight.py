@@ -17,6 +17,7 @@ from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios fin
 from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
 from scenarios.harness.config.validation import validated
+from scenarios.harness.seeds import LARGEST_SEED
 from sim.clock import Rates
 from sim.log import FLOWN_DTYPE, TRUTH_DTYPE
 from sim.outside.numbers import RIGHT, is_odd, number
@@ -29,7 +30,6 @@ from sim.sensors.fitting import SuiteParams, own_files, suite_params
 MOST_BYTES = 2_000_000_000  # of a flight's log, which is held in memory
 ROW_BYTES = sum(dtype.itemsize for dtype in (TRUTH_DTYPE, MEASURED_DTYPE, FLOWN_DTYPE))
 SMALLEST, LARGEST = 1e-12, 1e9  # of a number that is no zero, in whatever unit
-LARGEST_SEED = 2**32 - 1
 
 Chance = Literal["random"]
 Triple = tuple[float, float, float]
