@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
 from estimator.instruments import Instruments, Known, property_value
+from scenarios.harness import lent
 from scenarios.harness.own_files import also_import_from, module_of_file
 from sim.outside.blame import Refused, home_of, place_of, shown, theirs
 from sim.outside.wording import class_name, described, printable
@@ -389,6 +390,9 @@ def _arguments(kind: _Kind, spec: "str | Maker", maker: Any) -> set[str]:
 
 def _find(kind: _Kind, spec: str) -> Any:
     """The class (or whatever is called to make one) that `spec` names."""
+    if lent.is_lent(spec):
+        with _refusing(kind, spec):
+            return lent.find(spec)
     named = spec
     if spec in kind.registry:
         spec = kind.registry[spec]
