@@ -20,7 +20,6 @@ from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import is_dataclass
 from functools import partial
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,6 +30,7 @@ from estimator.instruments import Instruments, Known, property_value
 from scenarios.harness import lent
 from scenarios.harness.own_files import also_import_from, module_of_file
 from sim.outside.blame import Refused, home_of, place_of, shown, theirs
+from sim.outside.entry_points import Offer, offered
 from sim.outside.wording import class_name, described, printable
 from sim.params import changed, dotted_fields
 from sim.params import near_misses as near_misses
@@ -46,17 +46,18 @@ _ALL_ESTIMATORS = ChainMap(ESTIMATORS, {"oracle": "sim.oracle:Oracle"})
 
 
 class _Kind(NamedTuple):
-    """What is looked up: its word for messages, our registry, the group of entry points, arguments of `update`."""
+    """What is looked up: its word for messages, our registry, arguments of `update`."""
 
     word: str
     registry: Mapping[str, str]
-    group: str
     arguments: tuple[str, ...]
 
 
 _NOT_SET = {"params", "instruments", "self"}  # arguments of constructors that are no settings
-_ESTIMATOR = _Kind("estimator", _ALL_ESTIMATORS, "wingslevel.estimators", ("measurements",))
-_AUTOPILOT = _Kind("autopilot", AUTOPILOTS, "wingslevel.autopilots", ("estimate", "measurements", "setpoint"))
+_ESTIMATOR = _Kind("estimator", _ALL_ESTIMATORS, ("measurements",))
+_AUTOPILOT = _Kind("autopilot", AUTOPILOTS, ("estimate", "measurements", "setpoint"))
+OURS: Mapping[str, Mapping[str, str]] = {f"{kind.word}s": kind.registry for kind in (_ESTIMATOR, _AUTOPILOT)}
+"""The flight code of this project by name, with where each one is: "estimators" and "autopilots"."""
 
 
 class PluginError(ValueError):
@@ -356,26 +357,50 @@ def load_autopilot(
     return autopilot
 
 
-def _installed(kind: _Kind) -> dict[str, EntryPoint]:
-    return {point.name: point for point in entry_points(group=kind.group) if point.name not in kind.registry}
+def load_class(word: str, spec: str) -> Any:
+    """What makes flight code that `spec` names, not called yet; `word` is "estimator" or "autopilot".
+
+    Raises
+    ------
+    PluginError     one line: nothing of that name, code that cannot be imported, or something that makes nothing
+    """
+    kind = _ESTIMATOR if word == _ESTIMATOR.word else _AUTOPILOT
+    found = _find(kind, spec)
+    _require_maker(kind, spec, found)
+    return found
+
+
+def module_of_offer(word: str, spec: str) -> str:
+    """Name of the module that the entry point `spec` points to; empty where an installed package offers none such."""
+    kind = _ESTIMATOR if word == _ESTIMATOR.word else _AUTOPILOT
+    found = None if ":" in spec or spec in kind.registry else _installed(kind).get(spec)
+    return "" if found is None else found.module
+
+
+def _installed(kind: _Kind) -> dict[str, Offer]:
+    return offered(f"{kind.word}s", kind.registry)
 
 
 def _offered(kind: _Kind) -> dict[str, str]:
-    return {**kind.registry, **{name: point.value for name, point in _installed(kind).items()}}
+    return {**kind.registry, **{name: offer.value for name, offer in _installed(kind).items()}}
 
 
 def _made(kind: _Kind, spec: "str | Maker", maker: Any, offered: Mapping[str, Any]) -> Any:
     """What `maker` makes of those of the `offered` arguments that it asks for, checked."""
-    if not callable(maker):
-        raise PluginError(
-            f"{kind.word} {maker_name(spec)!r}: {shown(maker)} is no class; name the class, or a function that makes a "
-            "new one for each flight"
-        )
+    _require_maker(kind, spec, maker)
     asked = _arguments(kind, spec, maker)
     with _refusing(kind, spec, home_of(maker)):
         made = maker(**{name: value for name, value in offered.items() if name in asked})
     _check_update(kind, spec, made)
     return made
+
+
+def _require_maker(kind: _Kind, spec: "str | Maker", maker: Any) -> None:
+    if not callable(maker):
+        raise PluginError(
+            f"{kind.word} {maker_name(spec)!r}: {shown(maker)} is no class; name the class, or a function that makes a "
+            "new one for each flight"
+        )
 
 
 def _arguments(kind: _Kind, spec: "str | Maker", maker: Any) -> set[str]:
@@ -399,11 +424,12 @@ def _find(kind: _Kind, spec: str) -> Any:
     elif ":" not in spec:
         installed = _installed(kind)
         if spec in installed:
-            point = installed[spec]
-            with _refusing(kind, spec, point.value.partition(":")[0].partition(".")[0]):
-                return point.load()
+            offer = installed[spec]
+            named = f"{kind.word} {spec!r} of {offer.origin}"
+            with theirs(lambda line: PluginError(f"{named}: {line}"), offer.package):
+                return offer.load()
         hint = near_misses(spec, _offered(kind))
-        raise PluginError(f"unknown {kind.word} {spec!r}: {hint} (one's own: module:Class or file.py:Class)")
+        raise PluginError(f"unknown {kind.word} {spec!r}: {hint} (your own: module:Class or file.py:Class)")
     place, _, name = spec.rpartition(":")
     if place.endswith(".py"):
         module = module_of_file(Path(place), lambda line: PluginError(f"{kind.word} {named!r}: {line}"))

@@ -1,13 +1,17 @@
-"""The scenarios there are: of every module of the package, and of anyone's own file.
+"""The scenarios there are: of every module of the package, of installed packages, and of anyone's own file.
 
 A module exports ``SCENARIO``, named as its file.  One that has variants exports besides ``VARIANTS``, a literal
 dictionary from the ending of each name to the line that tells of it (so that a listing need import nothing), and
 ``SCENARIOS``, the first and its variants in that order.
+
+An installed package offers a scenario by an entry point in the group ``wingslevel.scenarios``: a module that exports
+``SCENARIO``, or a Scenario.  It is called what the entry point is called.
 """
 
 import importlib
 import pkgutil
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
@@ -15,10 +19,12 @@ from types import MappingProxyType, ModuleType
 from typing import cast
 
 import scenarios
+from scenarios.harness.cli import console
 from scenarios.harness.own_files import module_of_file
 from scenarios.harness.plugins import near_misses
 from scenarios.harness.scenario import Scenario
 from sim.outside.blame import Refused, shown, theirs
+from sim.outside.entry_points import Offer, offered
 
 
 @cache
@@ -41,6 +47,7 @@ def matching(patterns: Iterable[str]) -> list[str]:
     for pattern in patterns:
         if "*" in pattern or "?" in pattern:
             found = [name for name in registered() if fnmatchcase(name, pattern)]
+            found += [name for name in _offered() if fnmatchcase(name, pattern) and _can_be_loaded(name)]
             if not found:
                 raise ValueError(f"no scenario is called {pattern!r}: `wingslevel list` names all there are")
             names |= dict.fromkeys(found)
@@ -58,9 +65,44 @@ def find(name: str) -> Scenario:
     """
     if name.endswith(".py"):
         return _from_file(Path(name))
-    if name not in registered():
-        raise ValueError(f"unknown scenario {name!r}: {near_misses(name, registered())} (one's own: file.py)")
-    return registered()[name]
+    if name in registered():
+        return registered()[name]
+    offers = _offered()
+    if name not in offers:
+        raise ValueError(
+            f"unknown scenario {name!r}: {near_misses(name, [*registered(), *offers])} (your own: file.py)"
+        )
+    return _from_offer(offers[name])
+
+
+def module_of_offer(name: str) -> str:
+    """Name of the module that the entry point `name` points to; empty where an installed package offers none such."""
+    offers = {} if name in registered() else _offered()
+    return offers[name].module if name in offers else ""
+
+
+def _offered() -> dict[str, Offer]:
+    """The scenarios that installed packages offer, by name."""
+    return offered("scenarios", registered())
+
+
+def _can_be_loaded(name: str) -> bool:
+    """Whether a scenario of an installed package is there; one line says so where it is not."""
+    try:
+        find(name)
+    except ValueError as problem:
+        console.error(f"left out: {problem}")
+        return False
+    return True
+
+
+def _from_offer(offer: Offer) -> Scenario:
+    with theirs(lambda line: ValueError(f"scenario {offer.name!r} of {offer.origin}: {line}"), offer.package):
+        found = offer.load()
+        scenario = _of(found) if isinstance(found, ModuleType) else found
+        if not issubclass(type(scenario), Scenario):
+            raise Refused(f"{offer.value} is {shown(scenario)}, must be a Scenario, or a module that exports SCENARIO")
+        return replace(scenario, name=offer.name)
 
 
 def _from_file(path: Path) -> Scenario:

@@ -16,8 +16,12 @@
     "accelerometer.bias_g" = 0.02
 
 A part ``generic`` has the defaults of its dataclass; a part ``perfect`` has no error.
+
+An installed package offers a suite by an entry point in the group ``wingslevel.suites``: ``my_package:suite.toml``, a
+file in the package, or ``my_package:SUITE``, a path.  Parts in files of their own lie beside it.
 """
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -25,6 +29,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
+from sim.outside.blame import Refused, shown, theirs
+from sim.outside.entry_points import Offer, offered
 from sim.outside.files import reading
 from sim.params import changed, near_misses
 from sim.sensors.accelerometer import AccelerometerParams
@@ -65,6 +71,7 @@ def load_suite(name: str, files: Mapping[str, str] = NO_FILES) -> SuiteParams:
     ------
     ValueError      one line: no such suite (with the near misses) or file, or what is wrong in the file
     """
+    files = _kept(name, files)
     file, data = _read(name, files)
     with reading(file):
         return _fit(file, data, _folder(name), files)
@@ -80,25 +87,69 @@ def suite_params(suite: str, changes: Mapping[str, Any], files: Mapping[str, str
 
 
 def own_files(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
-    """The text of every file of one's own that makes the suite `name`, by path; none for a suite from here."""
+    """The text of every file that makes the suite `name`, by path; none for one of wingslevel's own.
+
+    The paths of an installed package's suite begin with its name: they are the same on every machine.
+    """
     if not name.endswith(".toml"):
-        return {}
-    _, data = _read(name, files)
+        offer = _offered().get(name)
+        return {} if offer is None else _files_of(offer)
+    text = read_text(Path(name), files, "sensor suite")
+    return {name: text} | _part_files(read_toml(name, text), Path(name).parent, Path(name).parent, files)
+
+
+def _part_files(
+    data: Mapping[str, Any], folder: Path, called: Path, files: Mapping[str, str] = NO_FILES
+) -> dict[str, str]:
+    """The text of each part of a suite that is a file in `folder`, by its path below `called`."""
     parts = [data[kind] for kind in KINDS if isinstance(data.get(kind), str)]
-    paths = [part_path(part, _folder(name)) for part in parts if part.endswith(".toml")]
-    kept = {str(path): read_text(path, files, "part") for path in paths}
-    return {name: read_text(Path(name), files, "sensor suite")} | kept
+    own = [part for part in parts if part.endswith(".toml")]
+    return {str(part_path(part, called)): read_text(part_path(part, folder), files, "part") for part in own}
+
+
+def suite_names() -> list[str]:
+    """Names of all suites that need no path: wingslevel's own, then those of installed packages."""
+    return [*_suite_names(), *_offered()]
+
+
+def _offered() -> dict[str, Offer]:
+    """The suites that installed packages offer, by name."""
+    return offered("suites", _suite_names())
+
+
+def _kept(name: str, files: Mapping[str, str]) -> Mapping[str, str]:
+    """`files`; where the suite `name` is of an installed package and not in them, its files."""
+    known = name in files or name.endswith(".toml") or name in _suite_names()
+    return files if known or not (found := own_files(name)) else found
+
+
+def _files_of(offer: Offer) -> dict[str, str]:
+    """The files of a suite that an installed package offers, by paths that begin with its name."""
+
+    def refuse(line: str) -> ValueError:
+        return ValueError(f"sensor suite {offer.name!r} of {offer.origin}: {line}")
+
+    with theirs(refuse, offer.package):
+        found = offer.resource() or offer.load()
+        path = os.fspath(found) if isinstance(found, str | os.PathLike) else ""
+        if not isinstance(path, str) or not path.endswith(".toml"):
+            raise Refused(f"{offer.value} is {shown(found)}, must be the path of a .toml file")
+    try:
+        text = read_text(Path(path), NO_FILES, "sensor suite")
+        return {offer.name: text} | _part_files(read_toml(path, text), Path(path).parent, Path(offer.name))
+    except ValueError as error:
+        raise refuse(str(error)) from error
 
 
 def suite_parts(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
     """What is in the suite `name` or in a file, as it is written there: kind -> part, and its summary."""
-    _, data = _read(name, files)
+    _, data = _read(name, _kept(name, files))
     return {key: data[key] for key in ("summary", *KINDS) if key in data}
 
 
 def suite_settings(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, Any]:
     """What the suite `name` or a file says of its board, its converter and single figures: dotted name -> value."""
-    file, data = _read(name, files)
+    file, data = _read(name, _kept(name, files))
     board = dict(_table(file, "board", data))
     converter = board.pop("converter", {})
     settings = {f"board.{key}": value for key, value in board.items()}
@@ -140,15 +191,19 @@ def _read(name: str, files: Mapping[str, str]) -> tuple[str, dict[str, Any]]:
     if name.endswith(".toml"):
         return name, read_toml(name, read_text(Path(name), files, "sensor suite"))
     if name not in _suite_names():
+        if name in files:
+            return name, read_toml(name, files[name])
         raise ValueError(
-            f"unknown sensor suite {name!r}: {near_misses(name, _suite_names())} (one's own: path/to/suite.toml)"
+            f"unknown sensor suite {name!r}: {near_misses(name, suite_names())} (your own: path/to/suite.toml)"
         )
     path = FOLDER / f"{name}.toml"
     return path.name, read_toml(path.name, path.read_text(encoding="utf-8"))
 
 
 def _folder(name: str) -> Path | None:
-    return Path(name).parent if name.endswith(".toml") else None
+    if name.endswith(".toml"):
+        return Path(name).parent
+    return None if name in _suite_names() else Path(name)
 
 
 def _fit(file: str, data: Mapping[str, Any], folder: Path | None, files: Mapping[str, str]) -> SuiteParams:

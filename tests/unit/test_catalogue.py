@@ -18,7 +18,7 @@ def test_catalogue_names_equal_registries() -> None:
     """Every name that is listed can be flown, and every one that can be flown is listed."""
     listed = {kind: set(things) for kind, things in catalogue().items()}
     assert listed["scenarios"] == set(registered())
-    assert listed["sensor suites"] == set(SUITES)
+    assert listed["suites"] == set(SUITES)
     assert listed["estimators"] >= set(ESTIMATORS)
     assert listed["autopilots"] >= set(AUTOPILOTS)
 

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
@@ -69,16 +68,6 @@ def test_load_estimator_without_optional_parts_is_accepted(file_of) -> None:
     """Only `update` is required; the heading reference is the course where none is named."""
     estimator = plugins.load_estimator(f"{file_of('class Bare:' + chr(10) + ' def update(self, m): ...')}:Bare")
     assert plugins.heading_reference_of(estimator) == "course"
-
-
-def test_load_estimator_entry_point_is_found(file_of, monkeypatch) -> None:
-    """A package that is installed offers its estimators by name."""
-    monkeypatch.chdir(file_of(FINE, "packaged_own.py").parent)
-    monkeypatch.syspath_prepend(".")
-    point = EntryPoint("theirs", "packaged_own:Fine", "wingslevel.estimators")
-    monkeypatch.setattr(plugins, "entry_points", lambda group: [point] if group == point.group else [])
-    assert plugins.estimators()["theirs"] == "packaged_own:Fine"
-    assert type(plugins.load_estimator("theirs")).__name__ == "Fine"
 
 
 @pytest.mark.parametrize(

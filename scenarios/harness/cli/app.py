@@ -21,12 +21,15 @@ from scenarios.harness.cli.options import (
     EstimatorOption,
     FlightTimeoutOption,
     JsonOption,
+    KindArgument,
     LedgerOption,
     LogEstimatorsOption,
     MarkdownOption,
+    NamesArgument,
     NoRerunOption,
     OutOption,
     ParameterOption,
+    ParamsOption,
     PictureOption,
     ReferenceOption,
     ScenarioArgument,
@@ -42,7 +45,7 @@ from scenarios.harness.cli.options import (
     names_of,
     time_limit,
 )
-from scenarios.harness.cli.reports import losses, reporting
+from scenarios.harness.cli.reports import losses
 from scenarios.harness.cli.values import Commands, number_in, whole_in
 from scenarios.harness.gate.guard import BROKEN
 from sim.outside.blame import show_traceback, show_tracebacks
@@ -104,15 +107,12 @@ def _root(
 
 
 @app.command("list")
-def list_(json_: JsonOption = None) -> None:
-    """What there is: scenarios, estimators, autopilots, aircraft, sensor suites, parts."""
-    from scenarios.harness.commands.catalogue import catalogue
+def list_(kind: KindArgument = None, names: NamesArgument = None, params: ParamsOption = False,
+          json_: JsonOption = None) -> None:  # fmt: skip
+    """Scenarios, estimators, autopilots, aircraft, sensor suites and parts, with where each one comes from."""
+    from scenarios.harness.commands import listing
 
-    with reporting(json_) as report:
-        found = catalogue()
-        for kind, things in found.items():
-            console.out().print(console.name_table(kind, things))
-        report(found)
+    listing.run(kind, names or [], params=params, json_=json_)
 
 
 @app.command()

@@ -21,6 +21,12 @@ ScenarioArgument = Annotated[
     str,
     typer.Argument(help="Name of a scenario, or file.py with one's own.", autocompletion=complete.scenarios),
 ]
+KindArgument = Annotated[
+    str | None,
+    typer.Argument(help="scenarios, estimators, autopilots, aircraft, suites or parts.", autocompletion=complete.kinds),
+]
+NamesArgument = Annotated[list[str] | None, typer.Argument(help="Some of that kind; all by default.")]
+ParamsOption = Annotated[bool, typer.Option("--params", help="The parameters of estimators, for --set.")]
 EstimatorOption = Annotated[
     str | None,
     typer.Option(

@@ -87,7 +87,7 @@ def aircraft(incomplete: str) -> Sequence[str]:
 
 def suites(incomplete: str) -> Sequence[str]:
     """Names of sensor suites that begin so."""
-    return _beginning(incomplete, "sensor suites")
+    return _beginning(incomplete, "suites")
 
 
 def suites_and_parts(incomplete: str) -> Sequence[str]:
@@ -103,6 +103,13 @@ def claims(incomplete: str) -> Sequence[str]:
     texts = (path.read_text(encoding="utf-8") for path in sorted(folder.glob("[!_]*.py")))
     names = {found for text in texts for found in re.findall(r'Claim\(\s*(?:name=)?"(\w+)"', text)}
     return sorted(name for name in names if name.startswith(incomplete))
+
+
+def kinds(incomplete: str) -> Sequence[str]:
+    """Kinds of things that have names, which begin so."""
+    from scenarios.harness.commands.catalogue import KINDS
+
+    return [kind for kind in KINDS if kind.startswith(incomplete)]
 
 
 def _beginning(incomplete: str, kind: str) -> Sequence[str]:

@@ -1,4 +1,4 @@
-"""What there is to fly, told without importing any of it: a listing must not wait for compilers and engines."""
+"""Everything with a name, with a line about each, read from the sources: a listing waits for no compiler or engine."""
 
 import ast
 import tomllib
@@ -6,21 +6,33 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.harness import plugins
+from sim.outside.entry_points import offered
 
+KINDS = ("scenarios", "estimators", "autopilots", "aircraft", "suites", "parts")
 _ROOT = Path(__file__).resolve().parents[3]
 
 
 def catalogue() -> dict[str, dict[str, str]]:
-    """Everything that has a name on the command line: kind -> name -> one line about it, names in order."""
-    found = {
+    """Everything that has a name on the command line: kind -> name -> one line about it, names in order.
+
+    What an installed package offers is named and not imported: its line says where it is.
+    """
+    found = ours()
+    for kind, things in found.items():
+        offers = offered(kind, things).values()
+        found[kind] |= {offer.name: f"{offer.value} ({offer.origin})" for offer in offers}
+    return {kind: dict(sorted(things.items())) for kind, things in found.items()}
+
+
+def ours() -> dict[str, dict[str, str]]:
+    """As `catalogue`, without what installed packages offer."""
+    return {
         "scenarios": {n: told for p in (_ROOT / "scenarios").glob("[!_]*.py") for n, told in _scenarios(p).items()},
-        "estimators": {name: _about(where) for name, where in plugins.estimators().items()},
-        "autopilots": {name: _about(where) for name, where in plugins.autopilots().items()},
+        **{kind: {name: _about(where) for name, where in code.items()} for kind, code in plugins.OURS.items()},
         "aircraft": aircraft(),
-        "sensor suites": sensor_suites(),
+        "suites": sensor_suites(),
         "parts": parts(),
     }
-    return {kind: dict(sorted(things.items())) for kind, things in found.items()}
 
 
 def _scenarios(path: Path) -> dict[str, str]:

@@ -14,6 +14,7 @@ from scenarios.harness.cli import console
 from scenarios.harness.cli import reports as cli_reports
 from scenarios.harness.cli.options import Changes
 from scenarios.harness.cli.reports import check_file, reporting, usage, write
+from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.flight import fly_scenario, prepare
 from scenarios.harness.gate import guard
 from scenarios.harness.gate.ledger import Ledger
@@ -84,6 +85,7 @@ def tasks(
     found = []
     for name, prepared in zip(wanted, all_prepared, strict=True):
         console.warn_of_faults(name, prepared.config)
+        note_ignored(name, prepared.config)
         decides = decided_by(name, prepared) | {"changes": recording.plain(changes)} if keyed else {}
         for seed in seeds:
             key = fingerprint(decides | {"seed": seed}) if keyed else ""

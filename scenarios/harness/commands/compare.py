@@ -30,6 +30,7 @@ from scenarios.harness.commands.comparison import (
     Traced,
     print_report,
 )
+from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import Prepared, fly_scenario, prepare_config
 from scenarios.harness.flight import prepare as prepare_flight
@@ -116,6 +117,8 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     prepared = {name: prepare_flight(scenario, {**changes_of[name], "estimator": name}, lenient=True) for name in names}
     first = prepared[names[0]]
     console.warn_of_faults(scenario, first.config)
+    for of_it in prepared.values():
+        note_ignored(scenario, of_it.config)
     references = {name: of_it.heading_reference for name, of_it in prepared.items()}
     instruments = {name: given(of_it) for name, of_it in prepared.items()}
     notes = (*without(of_each, settings), *_unheard(prepared))

@@ -10,6 +10,7 @@ from scenarios.harness.cli import console
 from scenarios.harness.cli.options import Changes
 from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.commands import view as viewing
+from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import prepare
 from scenarios.harness.gate import guard
@@ -83,6 +84,7 @@ def fly(
     scenario, config = prepared.scenario, prepared.config
     recording.check_writable(into)
     console.warn_of_faults(scenario.name, config)
+    note_ignored(scenario.name, config)
     if _FLIGHT in guard.lost:
         timed_out, message = guard.lost[_FLIGHT]
         outcome = Outcome.TIMED_OUT if timed_out else Outcome.WORKER_DIED

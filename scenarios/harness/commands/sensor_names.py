@@ -13,7 +13,7 @@ from scenarios.harness.commands import sensors
 from scenarios.harness.commands.sensors import Subject
 from sim.params import near_misses
 from sim.sensors.datasheet import KINDS, Part, load_part, part_names, read_text, read_toml
-from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_parts, suite_settings
+from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_names, suite_parts, suite_settings
 
 SHORT: Final = {
     "gyro": "gyro",
@@ -32,15 +32,15 @@ def subject(name: str) -> Subject:
     ------
     ValueError      one line: nothing of that name, with what comes near, or what is wrong in the file
     """
-    suites = {_plain(suite): suite for suite in SUITES}
+    suites = {_plain(suite): suite for suite in suite_names()}
     if _plain(name) in suites:
         return _suite(suites[_plain(name)])
     if name.endswith(".toml"):
         return _suite(name) if _is_suite(name) else _part(load_part(name))
-    known = [*part_names(), *SUITES, "perfect"]
+    known = [*part_names(), *suite_names(), "perfect"]
     if _plain(name) not in map(_plain, known):
         hint = near_misses(name, known)
-        raise ValueError(f"unknown part or suite {name!r}: {hint} (one's own: path/to/part.toml)")
+        raise ValueError(f"unknown part or suite {name!r}: {hint} (your own: path/to/part.toml)")
     return _part(load_part(name))
 
 

@@ -18,6 +18,8 @@ from types import ModuleType
 from typing import Any
 
 from scenarios.harness.flight import Prepared
+from scenarios.harness.plugins import module_of_offer
+from scenarios.harness.registry import module_of_offer as module_of_scenario
 from sim.recording import versions
 
 _ROOT = Path(__file__).resolve().parents[3]
@@ -31,10 +33,10 @@ def decided_by(named: str, prepared: Prepared) -> dict[str, Any]:
     config = prepared.config
     return {
         "scenario": prepared.scenario.name,
-        "scenario_file": _of_file(Path(named)) if named.endswith(".py") else "",
+        "scenario_file": _of_scenario(named),
         "config": config.model_dump(mode="json"),
-        "estimator": _of_code(config.estimator, type(prepared.estimator.code).__module__),
-        "autopilot": _of_code(config.autopilot, type(prepared.autopilot.code).__module__),
+        "estimator": _of_code("estimator", config.estimator, type(prepared.estimator.code).__module__),
+        "autopilot": _of_code("autopilot", config.autopilot, type(prepared.autopilot.code).__module__),
         "wingslevel": _ours(),
         "versions": _versions(),
     }
@@ -64,12 +66,20 @@ def _ours() -> str:
     return _hash(files, _ROOT)
 
 
-def _of_code(spec: str, module: str) -> str:
+def _of_scenario(named: str) -> str:
+    """The code of others that the scenario `named` is in, empty where it is of the project."""
+    return _of_file(Path(named)) if named.endswith(".py") else _of_others(module_of_scenario(named))
+
+
+def _of_code(word: str, spec: str, module: str) -> str:
     """The code of others behind `spec`, whose class is of `module`; empty where it is all of the project."""
-    place = spec.rpartition(":")[0]
-    if place.endswith(".py"):
-        return _of_file(Path(place))
-    found = {name for name in (place, module) if name in sys.modules and _is_others(sys.modules[name])}
+    place = spec.rpartition(":")[0] or module_of_offer(word, spec)
+    return _of_file(Path(place)) if place.endswith(".py") else _of_others(place, module)
+
+
+def _of_others(*modules: str) -> str:
+    """Those of the imported `modules` that are of others; empty where none is."""
+    found = {name for name in modules if name in sys.modules and _is_others(sys.modules[name])}
     return _of_modules(frozenset(found)) if found else ""
 
 
