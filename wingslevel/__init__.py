@@ -55,11 +55,14 @@ if TYPE_CHECKING:
     )
     from wingslevel._arrays import AirArrays, GpsArrays, MagArrays, estimate
     from wingslevel._attitudes import Attitudes
+    from wingslevel._campaigns import check, compare
     from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning
     from wingslevel._flight import Flight
     from wingslevel._flying import fly, load
     from wingslevel._names import autopilots, estimators, scenarios
     from wingslevel._pages import export, view
+    from wingslevel._replaying import Replay, replay
+    from wingslevel._results import CheckResult, Comparison
 
     __version__: str
 
@@ -72,11 +75,14 @@ _HOMES = {
     ),
     "wingslevel._arrays": ("AirArrays", "GpsArrays", "MagArrays", "estimate"),
     "wingslevel._attitudes": ("Attitudes",),
+    "wingslevel._campaigns": ("check", "compare"),
     "wingslevel._errors": ("Interrupted", "WingslevelError", "WingslevelWarning"),
     "wingslevel._flight": ("Flight",),
     "wingslevel._flying": ("fly", "load"),
     "wingslevel._names": ("autopilots", "estimators", "scenarios"),
     "wingslevel._pages": ("export", "view"),
+    "wingslevel._replaying": ("Replay", "replay"),
+    "wingslevel._results": ("CheckResult", "Comparison"),
 }  # fmt: skip
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -86,6 +92,8 @@ __all__ = [
     "AttitudeEstimate",
     "AttitudeEstimator",
     "Attitudes",
+    "CheckResult",
+    "Comparison",
     "Flight",
     "GpsArrays",
     "GpsFix",
@@ -95,15 +103,19 @@ __all__ = [
     "MagArrays",
     "MagSample",
     "Measurements",
+    "Replay",
     "WingslevelError",
     "WingslevelWarning",
     "__version__",
     "autopilots",
+    "check",
+    "compare",
     "estimate",
     "estimators",
     "export",
     "fly",
     "load",
+    "replay",
     "scenarios",
     "view",
 ]

@@ -48,7 +48,8 @@ def test_estimate_of_a_flight_is_its_replay(tmp_path: Any) -> None:
     )  # fmt: skip
     first = found.first
     assert first == expected.first
-    assert not (m["mag_new"].any() or m["air_new"].any())
+    assert not m["mag_new"].any()
+    assert not m["air_new"].any()
     np.testing.assert_allclose(found.R_eb[first:], expected.log.flown["R_eb"][first:], rtol=0, atol=1e-9)
     true_deg = Rotation.from_matrix(flight.truth["R_eb"]).as_euler("ZYX", degrees=True)[:, [2, 1]]
     airborne = flight.t_s > flight.release_s + 3.0

@@ -46,7 +46,9 @@ MANY = 8  # more lines than these are drawn thin, smoother and without shades
 
 def draw(comparison: Comparison, path: Path) -> None:
     """Draw `comparison` into `path`; its ending says the format.  ValueError where nothing was flown."""
-    write_figure(path, figure_of(comparison), DPI)
+    figure = figure_of(comparison)
+    with matplotlib.rc_context(STYLE):  # some parts of a figure are made as it is written
+        write_figure(path, figure, DPI)
 
 
 def figure_of(comparison: Comparison, kind: type[Figure] = Figure) -> Figure:
