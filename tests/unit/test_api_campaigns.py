@@ -80,7 +80,7 @@ def local() -> type:
 
 @pytest.mark.parametrize("estimator", [local(), lambda: Level(2.0), partial(local(), k=3.0)])
 def test_check_flies_here_what_cannot_be_sent(estimator: Any) -> None:
-    """A class inside a function, a lambda: without `workers` they fly in this process, with several they are refused."""
+    """Without `workers` they fly in this process, with several they are refused."""
     result = wl.check("crosswind", estimator=estimator, **SHORT)
     assert [flight.outcome for flight in result.flights] == ["completed"] * 2
     with pytest.raises(wl.WingslevelError, match=r"cannot be sent to other processes.*file\.py:Class") as refused:
