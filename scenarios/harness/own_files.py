@@ -1,7 +1,7 @@
 """Modules in files of the user's own: estimators, autopilots and scenarios named as ``path/to/file.py``.
 
 A file is run anew each time, so that flights share nothing.  Its module has the name under which it would be imported
-where that name is free; else, as for a second file of that name, one made of its path.  Compiled kernels are cached
+if that name is free; else, as for a second file of that name, one made of its path.  Compiled kernels are cached
 with the name of their module in them: those of a file under such a name are cached apart, so that what one process
 caches another can load, whatever it calls the file.
 """

@@ -1,4 +1,4 @@
-"""A flight that was flown, put on disk: its folder appears complete, or not at all."""
+"""Write a flight to disk: its folder appears complete, or not at all."""
 
 from pathlib import Path
 
@@ -9,14 +9,14 @@ from sim.log import Flight
 
 
 def record(flight: Flight, into: Path, name: str, *, rerun: bool) -> Path | None:
-    """Record `flight` in a new folder below `into`, named `name` or, where that is taken, ``name-2``.
+    """Record `flight` in a new folder below `into`, named `name` or, if that is taken, ``name-2``.
 
-    What was flown is judged and reported whether or not it can be written: what cannot is told on one line, and
-    makes the command fail when all is done (`cli_reports.losses`).
+    The verdict is reported even if the recording cannot be written: that prints one line, and the command fails at the
+    end (`cli_reports.losses`).
 
     Returns
     -------
-    The folder; None where it could not be written.  Without the Rerun recording, where that alone could not be.
+    The folder; None if it could not be written.  Without the Rerun recording, if that alone could not be.
     """
     cli_reports.come_home()
     with cli_reports.attempt():

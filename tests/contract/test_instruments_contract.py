@@ -178,7 +178,7 @@ def test_property_set_for_a_comparison_goes_to_those_that_have_it_and_a_note_lis
     """And is refused where none has it."""
     plan = compare.prepare("turns_180", ["premerlani", "gyro_only"], [0], {"gps_latency_s": 0.6})
     assert plan.notes == ("gps_latency_s is set for premerlani; without that parameter: gyro_only",)
-    with pytest.raises(ValueError, match=r"gps_latency_s = 0\.6: none of them has such a parameter"):
+    with pytest.raises(ValueError, match=r"gps_latency_s = 0\.6: no estimator has a parameter of that name"):
         compare.prepare("turns_180", ["gyro_only"], [0], {"gps_latency_s": 0.6})
 
 

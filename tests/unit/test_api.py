@@ -157,7 +157,7 @@ def test_fly_refuses_an_option_that_there_is_not() -> None:
 
 def test_fly_warns_of_a_fault_after_the_end() -> None:
     """It is allowed, and hardly meant."""
-    with pytest.warns(wl.WingslevelWarning, match=r"gps:outage@30.* is never met"):
+    with pytest.warns(wl.WingslevelWarning, match=r"gps:outage@30.* never happens"):
         wl.fly("crosswind", duration=1, faults="gps:outage@30")
 
 

@@ -189,3 +189,18 @@ def test_completion_imports_nothing_heavy() -> None:
         "print([m for m in ('numpy', 'numba', 'jsbsim', 'pyarrow', 'rich') if m in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["check", "--help"], ["list"]])
+def test_reader_that_closes_the_pipe_is_no_error(arguments: list[str]) -> None:
+    """As with ``| head -1``: nothing on standard error, exit code 0."""
+    code = "import sys; from scenarios.harness.gate.guard import main; main()"
+    read, write = os.pipe()
+    os.close(read)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments], stdout=write, stderr=subprocess.PIPE, text=True, check=False
+        )
+    finally:
+        os.close(write)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -124,5 +124,5 @@ def test_check_flies_every_seed_with_the_faults(here, monkeypatch):
 def test_fault_that_the_flight_is_too_short_for_is_warned_of(here, capsys):
     """It is flown, and a line on standard error says that the fault was never met."""
     assert run([*SHORT, "--fault", "gyro.x:stuck@20-25"]) in (0, 1)
-    assert "warning: fault gyro.x:stuck@20-25 is never met" in capsys.readouterr().err
+    assert "warning: fault gyro.x:stuck@20-25 never happens" in capsys.readouterr().err
     assert not any("stuck" in event.text for event in recorded(here).events)

@@ -5,6 +5,7 @@ problem of usage or configuration is one line on standard error, found before an
 imports wait until a command needs them.
 """
 
+import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import Annotated
@@ -45,14 +46,14 @@ from scenarios.harness.cli.options import (
     names_of,
     time_limit,
 )
-from scenarios.harness.cli.reports import losses
+from scenarios.harness.cli.reports import abandon, losses
 from scenarios.harness.cli.values import Commands, number_in, whole_in
 from scenarios.harness.gate.guard import BROKEN
 from sim.outside.blame import show_traceback, show_tracebacks
 from sim.outside.signals import listening
 from sim.outside.wording import described
 
-FLIGHTS = Path("flights")  # where recordings go unless told otherwise
+FLIGHTS = Path("flights")  # where recordings go by default
 
 app = typer.Typer(
     name="wingslevel",
@@ -77,6 +78,9 @@ def run(arguments: list[str]) -> int:
         return USAGE
     except (typer.Abort, KeyboardInterrupt):
         code = INTERRUPTED
+    except SystemExit:  # typer's way to end when the reader of a help page has closed the pipe
+        abandon(sys.stdout)
+        return 0
     except Exception as error:  # a fault of ours: one line, and never a verdict that looks complete
         console.error(f"internal error: {described(error)}; wingslevel --traceback shows where")
         show_traceback(error)

@@ -1,4 +1,4 @@
-"""What a person reads: tables, progress, one-line errors.  Rich is imported on first use, not on import.
+"""What the user reads: tables, progress, one-line errors.  Rich is imported on first use, not on import.
 
 Everything goes to standard output, or to standard error while standard output carries JSON.  Colour appears on a
 terminal, or where FORCE_COLOR is set, and never where NO_COLOR is.  Tables fit 80 columns.
@@ -33,7 +33,7 @@ _LONGEST = 2000  # characters of a line on standard error
 
 
 class _Wishes:
-    """What the person wants of all that is printed."""
+    """What the user wants printed."""
 
     quiet = False
     lines: list[str] | None = None  # where lines for standard error go instead
@@ -60,7 +60,7 @@ def be_quiet(quiet: bool = True) -> None:
 
 
 def be_tolerant() -> None:
-    """Let no character be fatal to the standard streams: one that their encoding lacks is written as its escape."""
+    """Write characters that the encoding of the standard streams lacks as escapes, instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -80,14 +80,14 @@ def _console(stderr: bool, quiet: bool | None = None) -> "Terminal":
     from scenarios.harness.cli.terminal import LEAST, Terminal
 
     console = Terminal(stderr=stderr, quiet=_Wishes.quiet if quiet is None else quiet)
-    # Where nobody has said how wide it is, a file or a pipe takes what a table needs.
+    # A file or a pipe of unknown width takes what a table needs.
     unknown = not console.is_terminal and not os.environ.get("COLUMNS", "").isdigit()
     console.width = max(console.width, WIDTH if unknown else LEAST)
     return console
 
 
 def line(text: str, style: str = "") -> None:
-    """A line of standard output, whatever the text holds; the terminal breaks it where it is too long."""
+    """One line on standard output, whatever the text holds; the terminal wraps it."""
     from rich.text import Text
 
     out().print(Text(escaped(text), style), soft_wrap=True)
@@ -101,12 +101,12 @@ def titled(name: str, about: str) -> "Text":
 
 
 def last(text: str) -> None:
-    """The line that says how it went: printed even where all else is quiet."""
+    """The result in one line: printed even with ``--quiet``."""
     _console(stderr=False, quiet=False).print(escaped(text), soft_wrap=True)
 
 
 def outcome(text: str) -> None:
-    """The line that stands for the whole of a page, where that is not printed."""
+    """The one line that replaces a page that is not printed (``--quiet``)."""
     if _Wishes.quiet:
         last(text)
 
@@ -129,9 +129,9 @@ def note(line: str) -> None:
 
 @contextmanager
 def compiling_told() -> Iterator[compiling.Watch]:
-    """Say, once inside the block, when kernels begin to be compiled; on a terminal count them while it lasts.
+    """Print one line when kernels start compiling inside the block; on a terminal, count them.
 
-    Gives what is called for each kernel of this process: it may be handed those of worker processes, too.
+    Yields the function to call for each compiled kernel, those of worker processes included.
     """
     shown = _Compiling()
     before = compiling.on_compile(shown)
@@ -145,7 +145,7 @@ def compiling_told() -> Iterator[compiling.Watch]:
 
 
 class _Compiling:
-    """Hears of each kernel that is compiled."""
+    """Called for each kernel that is compiled."""
 
     def __init__(self) -> None:
         self._began_s: float | None = None
@@ -153,7 +153,7 @@ class _Compiling:
         self._drawn = False
 
     def __call__(self, progress: compiling.Progress) -> None:
-        with suppress(OSError, ValueError):  # nobody reads standard error: that is no reason not to compile
+        with suppress(OSError, ValueError):  # standard error may be closed: compile all the same
             if self._began_s is None:
                 self._began_s, self._first = time.monotonic(), progress.compiled
                 console = _bars[-1].console if _bars else err()
@@ -184,20 +184,20 @@ class _Compiling:
 
 
 def note_left_out(scenarios: Sequence[str]) -> None:
-    """Say which scenarios are not flown with an estimator of one's own, on one line of standard error."""
+    """List the scenarios that are not flown with the user's estimator, on one line of standard error."""
     if scenarios:
         names = ", ".join(scenarios)
-        note(f"left out (passing where the scenario's own estimator fails): {names}")
+        note(f"left out (they pass only if an estimator fails): {names}")
 
 
 def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
-    """Say which faults the flight is too short for, each on a line of standard error."""
+    """Warn of faults that begin after the end of the flight, each on a line of standard error."""
     from scenarios.harness.config.faults import never_met
 
     for fault in never_met(config.faults, config.held_s, config.duration_s):
         error(
-            f"warning: fault {fault} is never met: {scenario} lasts from {-config.held_s:g} s to {config.duration_s:g} "
-            "s after the release"
+            f"warning: fault {fault} never happens: {scenario} lasts from {-config.held_s:g} s to "
+            f"{config.duration_s:g} s after the release"
         )
 
 
@@ -247,7 +247,7 @@ def claim_table(title: str, lines: Sequence[tuple[str, "Text", str]]) -> "Grid":
 
 
 def name_table(title: str, lines: Mapping[str, str]) -> "Grid":
-    """Names with a line about each."""
+    """Names, each with a one-line description."""
     from rich.text import Text
 
     grid = _grid(title)
@@ -310,9 +310,9 @@ def table(
     text: Sequence[int] = (0,),
     wrapping: Sequence[int] = (),
 ) -> "Grid":
-    """Any table; columns of `text` are left-aligned, the others right; no headings where all are empty.
+    """Any table; columns of `text` are left-aligned, the others right; no headings if all are empty.
 
-    Columns of `wrapping` give way where the table is too wide.
+    Columns of `wrapping` shrink if the table is too wide.
     """
     grid = _grid(title)
     grid.show_header = any(headings)
@@ -337,7 +337,7 @@ class Advance(Protocol):
 
 @contextmanager
 def progress(what: str, unit: str) -> Iterator[Advance]:
-    """A bar on standard error while the block runs; nothing where that is no terminal."""
+    """A progress bar on standard error while the block runs; nothing if that is not a terminal."""
     console = err()
     if _Wishes.quiet or collecting() or not console.is_terminal:
         yield lambda done, total: None  # noqa: ARG005 - the signature of Advance

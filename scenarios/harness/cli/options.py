@@ -19,7 +19,7 @@ MOST_WORKERS = max(64, 4 * (os.cpu_count() or 1))
 
 ScenarioArgument = Annotated[
     str,
-    typer.Argument(help="Name of a scenario, or file.py with one's own.", autocompletion=complete.scenarios),
+    typer.Argument(help="Name of a scenario, or file.py of your own.", autocompletion=complete.scenarios),
 ]
 KindArgument = Annotated[
     str | None,
@@ -84,7 +84,7 @@ ImuRateOption = Annotated[
 SensorsOption = Annotated[
     str | None,
     typer.Option(
-        "--sensors", metavar="NAME", help="Sensor suite, or suite.toml with one's own.", autocompletion=complete.suites
+        "--sensors", metavar="NAME", help="Sensor suite, or suite.toml of your own.", autocompletion=complete.suites
     ),
 ]
 FaultOption = Annotated[

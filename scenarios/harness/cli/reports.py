@@ -1,4 +1,4 @@
-"""What every command does alike: refuse in one line what it cannot do, and write its reports, whole or not at all."""
+"""What all commands share: reject bad input in one line, and write reports completely or not at all."""
 
 import errno
 import io
@@ -25,12 +25,12 @@ PICTURES = (".png", ".svg", ".pdf")  # formats that can be drawn
 
 @contextmanager
 def usage() -> Iterator[None]:
-    """What is refused inside the block is the user's to mend: one line, exit code 2."""
+    """A ValueError or OSError inside the block is a usage error: one line, exit code 2."""
     try:
         yield
     except UnicodeEncodeError as problem:
         text = problem.object[max(0, problem.start - 40) : problem.end + 40]
-        raise refusal(f"{brief(text)}: holds what is no Unicode text; choose another name") from problem
+        raise refusal(f"{brief(text)}: is not valid Unicode; choose another name") from problem
     except ValueError as problem:
         raise refusal(str(problem)) from problem
     except OSError as problem:  # a name that is too long, a folder that may not be looked into
@@ -38,13 +38,13 @@ def usage() -> Iterator[None]:
 
 
 def refusal(message: str) -> typer.TyperException:
-    """What ends a command with `message` as its one line and exit code 2: to be raised."""
+    """The exception that ends a command with the line `message` and exit code 2."""
     return typer.TyperException(message)
 
 
 @contextmanager
 def reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
-    """Gives what writes the JSON.  Where that goes to standard output, everything else goes to standard error."""
+    """Yields the function that writes the JSON.  With ``-`` everything else goes to standard error."""
     if target == "-":
         if sys.stdout is None:
             raise refusal("--json -: standard output is closed")
@@ -59,7 +59,7 @@ def reporting(target: str | None) -> Iterator[Callable[[Any], None]]:
 
 @contextmanager
 def _aside() -> Iterator[TextIO]:
-    """Standard output, for JSON alone: what else is written to it, by its descriptor too, goes to standard error."""
+    """Standard output, reserved for JSON: anything else written to its descriptor goes to standard error."""
     stdout = sys.stdout
     stdout.flush()
     try:
@@ -101,7 +101,7 @@ def _print(data: Any, stdout: TextIO) -> None:
 
 
 def abandon(stream: IO[str]) -> None:
-    """Send what is still in the buffer of a stream that cannot be written to nowhere, quietly."""
+    """Drop what is still buffered for a stream that can no longer be written."""
     with suppress(OSError, ValueError):  # it may be no file
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -130,19 +130,19 @@ def check_file(path: Path | None) -> None:
 
 
 def _try_device(path: Path) -> None:
-    """Write a blank to a device that is no terminal: nothing else tells one that is always full."""
+    """Write a blank to a device other than a terminal: the only way to detect one that is always full."""
     with path.open("wb", buffering=0) as device:
         if not device.isatty():
             device.write(b" ")
 
 
 def _is_stream(path: Path) -> bool:
-    """Whether `path` is there, and is neither a file nor a folder: /dev/stdout, a pipe."""
+    """Whether `path` exists and is neither a file nor a folder: /dev/stdout, a pipe."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def write(path: Path | None, content: Callable[[], str | bytes]) -> None:
-    """Write a report, complete or not at all; see `losses` for what happens where that cannot be."""
+    """Write a report, complete or not at all; see `losses` for what happens if that cannot be."""
     if path is None:
         return
     from sim.recording import RecordingError, replacing
@@ -182,13 +182,13 @@ def write_figure(path: Path, figure: "Figure", dpi: int) -> None:
 _lost: list[str] | None = None  # what could not be written inside `losses`
 
 
-_home: str | None = None  # where the command was begun
+_home: str | None = None  # working directory at the start of the command
 
 
 def come_home() -> None:
-    """Undo what flight code may have done to the process that reports are written by.
+    """Undo what flight code may have done to this process before reports are written.
 
-    It may have left the working directory, to which paths are relative, and closed the standard streams.
+    It may have changed the working directory, to which paths are relative, or closed the standard streams.
     """
     if _home is not None:
         os.chdir(_home)
@@ -200,9 +200,9 @@ def come_home() -> None:
 
 @contextmanager
 def losses() -> Iterator[list[str]]:
-    """Inside the block a report that cannot be written prints one line, and the command continues.
+    """Inside the block a report that cannot be written prints one line, and the command goes on.
 
-    What was measured is not lost with the first file that finds no room.  Gives the list of the lines told.
+    Results survive a full disk.  Yields the list of lines printed.
     """
     global _lost, _home
     before, _lost, _home = (_lost, _home), [], os.getcwd()
@@ -222,7 +222,7 @@ def attempt() -> Iterator[None]:
 
 
 def lose(message: str, problem: Exception | None = None) -> None:
-    """Tell of something that could not be written; outside `losses` it ends the command."""
+    """Report something that could not be written; outside `losses` it ends the command."""
     if _lost is None:
         raise refusal(message) from problem
     console.error(message)

@@ -36,7 +36,7 @@ class Terminal(Console):
             raise refusal(f"cannot write to standard output: {error.strerror}") from error
 
     def on_broken_pipe(self) -> None:
-        """Whoever read it has seen enough: the rest is for nobody, and the exit code stays that of the command."""
+        """The reader has closed the pipe: drop the rest and keep the exit code of the command."""
         abandon(self.file)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
@@ -53,7 +53,7 @@ class Grid(Table):
         self.heading = printable(heading)
 
     def column(self, heading: str, *, right: bool = False, wraps: bool = False) -> None:
-        """Add a column; only those that wrap give way where the table is too wide."""
+        """Add a column; only those that wrap shrink if the table is too wide."""
         self.add_column(
             Text(heading), justify="right" if right else "left", no_wrap=not wraps,
             overflow="fold" if wraps else "ignore",

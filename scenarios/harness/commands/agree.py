@@ -86,7 +86,7 @@ class Agreement:
 
     @property
     def exit_code(self) -> int:
-        """0 where they agree, else 1."""
+        """0 if they agree, else 1."""
         return 0 if self.agree else 1
 
     def worst(self) -> list[Difference]:

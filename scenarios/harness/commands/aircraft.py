@@ -1,4 +1,4 @@
-"""The handbook page of an aeroplane: what it can do and how it moves, computed from its model, printed and as JSON.
+"""The performance page of an aeroplane, computed from its model: what it can do and how it moves.
 
 Performance comes from trims (`sim.aeroplane.performance`), the modes from the model linearised at the cruise
 (`sim.aeroplane.linear`), beside the textbook's formulas for them from the same derivatives
@@ -98,7 +98,7 @@ class Handbook:
 
 
 def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
-    """Compute the page of the aircraft `name`; ValueError where there is no such aircraft."""
+    """Compute the page of the aircraft `name`; ValueError if there is no such aircraft."""
     model = Model(name, PHYSICS_HZ)
     p = performance.measure(model, height_m)
     linear = linearise(model, p.cruise, height_m)

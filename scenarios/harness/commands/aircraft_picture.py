@@ -1,4 +1,4 @@
-"""The handbook page as one picture: polar, power, trim, turns, and where the modes go with speed.
+"""The performance page as one picture: polar, power, trim, turns, and where the modes go with speed.
 
 Imported only when a picture is asked for: it brings matplotlib.
 """

@@ -48,7 +48,7 @@ class Speed:
 
     bare_us, closed_us : per tick, least of the repeats           median_ratio : over the pairs
     stages_us : per tick, by stage, recording included            update_ns : the estimator's `update`, per call
-    kernel_ns : its kernel over a whole log in one call, per tick; None where it has none (no `replay`)
+    kernel_ns : its kernel over a whole log in one call, per tick; None if it has none (no `replay`)
     """
 
     estimator: str
@@ -208,7 +208,7 @@ class Cruise:
             return least_ns(run) / len(inputs)
 
     def kernel_ns(self) -> float | None:
-        """The kernel over the same measurements in one call, nanoseconds a tick; None where there is none."""
+        """The kernel over the same measurements in one call, nanoseconds a tick; None if there is none."""
         estimator, _ = self.pilots()
         rows = self.log.measured.copy()
         with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):

@@ -60,7 +60,7 @@ def _first_line(node: ast.Module | ast.ClassDef) -> str:
 
 
 def _about(where: str) -> str:
-    """First line of the docstring of the class at ``module:Class``; the place itself where it is not ours."""
+    """First line of the docstring of the class at ``module:Class``; the place itself if it is not ours."""
     module, _, name = where.partition(":")
     path = _ROOT.joinpath(*module.split(".")).with_suffix(".py")
     if not path.is_file():

@@ -1,7 +1,7 @@
-"""Many flights judged: every scenario on every seed, over several processes, the same whatever their number.
+"""`wingslevel check`: every scenario on every seed, judged; the result does not depend on the number of processes.
 
-A flight is decided by its scenario, its overrides and its seed alone, and the verdicts are put together in the order
-in which the flights were named, so neither the number of workers nor their speed shows in the result.
+A flight depends on its scenario, its overrides and its seed alone, and verdicts are collected in the order in which the
+flights were named, so the result depends neither on the number of workers nor on their speed.
 """
 
 import time
@@ -39,7 +39,7 @@ class Task:
     estimator: str
     overrides: Mapping[str, Any]
     name: str  # of the scenario, which may be named by its file
-    key: str = ""  # fingerprint of all that decides it, where there is a ledger
+    key: str = ""  # fingerprint of everything that decides it, if there is a ledger
 
     def fly(self) -> FlightVerdict:
         """Fly it and judge it."""
@@ -48,7 +48,7 @@ class Task:
         return replace(judge(scenario, flight), wall_s=time.monotonic() - began_s)
 
     def lost(self, outcome: Outcome, message: str) -> FlightVerdict:
-        """The verdict where nothing came back."""
+        """The verdict if the process was lost."""
         return FlightVerdict(self.name, self.estimator, self.seed, outcome, (), {}, message)
 
 
@@ -60,9 +60,9 @@ def tasks(
     *,
     keyed: bool = False,
 ) -> list[Task]:
-    """Every scenario of `names` (all there are, where it is empty) on every seed.
+    """Every scenario of `names` (all by default) on every seed.
 
-    With an estimator of one's own, those that pass where their own estimator fails are left out, unless named in full.
+    With an estimator given, scenarios that pass only if an estimator fails are left out, unless named in full.
 
     keyed : with the fingerprint of what decides each, for a ledger
 
@@ -75,7 +75,7 @@ def tasks(
         left_out = [name for name in wanted if name not in names and find(name).expected_to_fail]
         wanted = [name for name in wanted if name not in left_out]
         if not wanted:
-            raise ValueError(f"{', '.join(left_out)}: passes where its own estimator fails; to fly it, name it in full")
+            raise ValueError(f"{', '.join(left_out)}: passes only if an estimator fails; to fly it, name it in full")
     if len(wanted) * len(seeds) > MOST_FLIGHTS:
         raise ValueError(
             f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
@@ -132,7 +132,7 @@ class Run:
         return console.INTERRUPTED if self.missing else self.verdict.exit_code
 
     def to_json(self) -> dict[str, Any]:
-        """The verdict, and under ``run`` all that another run of the same command may tell otherwise."""
+        """The verdict, and under ``run`` everything that may differ between two runs of the same command."""
         flights = [{"scenario": v.scenario, "seed": v.seed, "wall_s": v.wall_s} for v in self.verdict.flights]
         run = {"flown": self.flown, "resumed": self.resumed, "wall_s": self.wall_s, "flights": flights}
         return self.verdict.to_json() | {"run": run}

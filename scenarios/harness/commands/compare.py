@@ -74,7 +74,7 @@ class Task:
         return Traced(judge(scenario, flight), inclination_error_deg(flight), heading_error_deg()(flight))
 
     def lost(self, outcome: Outcome, message: str) -> Traced:
-        """What is to be known of it where nothing came back."""
+        """The result if the process was lost."""
         name = find(self.scenario).name
         return Traced(FlightVerdict(name, self.estimator, self.seed, outcome, (), {}, message), NO_SERIES, NO_SERIES)
 
@@ -99,7 +99,7 @@ class Plan:
 
 
 def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], changes: Mapping[str, Any]) -> Plan:
-    """Plan `scenario` with each of `estimators` (all that can be loaded, where none is named) on every seed.
+    """Plan `scenario` with each of `estimators` (all that can be loaded by default) on every seed.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def _unheard(prepared: Mapping[str, Prepared]) -> list[str]:
     for setting, value in next(iter(prepared.values())).config.instruments.items():
         deaf = [name for name, of_it in prepared.items() if setting in of_it.unheard]
         if len(deaf) == len(prepared):
-            raise ValueError(f"{setting} = {value!r}: none of them has such a parameter")
+            raise ValueError(f"{setting} = {value!r}: no estimator has a parameter of that name")
         if deaf:
             takers = ", ".join(name for name in prepared if name not in deaf)
             lines.append(f"{setting} is set for {takers}; without that parameter: {', '.join(deaf)}")
@@ -144,7 +144,7 @@ def _unheard(prepared: Mapping[str, Prepared]) -> list[str]:
 
 
 def _can_be_loaded(name: str) -> bool:
-    """Whether the package behind an estimator of the registry is there; one line says so where it is not."""
+    """Whether the package behind a registered estimator is installed; prints one line if not."""
     try:
         load_estimator(name)
     except PluginError as problem:
@@ -154,7 +154,7 @@ def _can_be_loaded(name: str) -> bool:
 
 
 def fly(plan: Plan, workers: int, advance: Callable[[int, int], None], *, limit_s: float | None = None) -> Comparison:
-    """Fly what is planned; `advance` is told how many flights are done, of how many.
+    """Fly the plan; `advance` is called with the number of flights done and the total.
 
     limit_s : wall-clock limit of each flight
 
@@ -199,14 +199,14 @@ class _Timing:
     estimator: str
 
     def fly(self) -> Cost:
-        """Measure it; its flights are kept where it raises."""
+        """Measure it; its flights are kept if it raises."""
         try:
             return cost(self.estimator, *_measured(self.scenario, self.config))
         except (NotTimed, ValueError) as problem:  # the latter of a script that asks for a longer flight
             return Cost(math.nan, None, str(problem))
 
     def lost(self, outcome: Outcome, message: str) -> Cost:
-        """What is known of it where nothing came back."""
+        """The result if the process was lost."""
         return Cost(math.nan, None, f"{outcome.replace('_', ' ')}: {message}")
 
 

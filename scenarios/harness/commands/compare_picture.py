@@ -45,14 +45,14 @@ MANY = 8  # more lines than these are drawn thin, smoother and without shades
 
 
 def draw(comparison: Comparison, path: Path) -> None:
-    """Draw `comparison` into `path`; its ending says the format.  ValueError where nothing was flown."""
+    """Draw `comparison` into `path`; its ending says the format.  ValueError if nothing was flown."""
     figure = figure_of(comparison)
     with matplotlib.rc_context(STYLE):  # some parts of a figure are made as it is written
         write_figure(path, figure, DPI)
 
 
 def figure_of(comparison: Comparison, kind: type[Figure] = Figure) -> Figure:
-    """`comparison` as a figure of the class `kind`; ValueError where nothing was flown."""
+    """`comparison` as a figure of the class `kind`; ValueError if nothing was flown."""
     flown = [e for e in comparison.entrants if e.flights]
     if not flown:
         raise ValueError("nothing was flown: there is nothing to draw")
@@ -116,7 +116,7 @@ def _binned(series: Sequence[Series], bin_s: float) -> tuple[Array, Array]:
 
 
 def _over_time(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> None:
-    """Median of the seeds, the middle half of them shaded, a cross where a flight ended early."""
+    """Median of the seeds, the middle half of them shaded, a cross if a flight ended early."""
     top, many = 1.0, len(entrants) > MANY
     bin_s = 3.0 * BIN_S if many else BIN_S
     for e in entrants:

@@ -38,7 +38,7 @@ class Entrant:
     """One estimator of the comparison: what it is given, and how its flights went.
 
     given : the instruments that it uses and that are fitted       n_planned : flights it was to fly
-    pooled : the scenario's checks over all its flights; None where none was flown      timing : None where not measured
+    pooled : the scenario's checks over all its flights; None if none was flown      timing : None if not measured
     """
 
     name: str
@@ -51,7 +51,7 @@ class Entrant:
 
     @property
     def cost(self) -> Cost | None:
-        """What an update costs; None where it was not measured, or failed."""
+        """What an update costs; None if it was not measured, or failed."""
         return None if self.timing is None or self.timing.failure else self.timing
 
     @property
@@ -125,8 +125,8 @@ class Comparison:
     def exit_code(self) -> int:
         """As of the command line.
 
-        0 where all flew, 1 where flight code or the scenario's own functions failed, 3 where a simulation blew up, 130
-        where it was interrupted
+        0 if all flew, 1 if flight code or the scenario's own functions failed, 3 if a simulation blew up, 130
+        if it was interrupted
         """
         outcomes = {f.verdict.outcome for e in self.entrants for f in e.flights}
         if not self.whole:

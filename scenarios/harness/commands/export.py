@@ -52,7 +52,7 @@ class Export:
 
 
 def parse_start(text: str | None) -> datetime:
-    """A date and time; without a zone it is UTC, as in every message.  ValueError where it is none."""
+    """A date and time; without a zone it is UTC, as in every message.  ValueError if it is none."""
     if text is None:
         return gps_messages.START
     try:
@@ -158,7 +158,7 @@ def print_report(export: Export) -> None:
 
 
 def _span(fixes: Fixes) -> tuple[float | None, float | None]:
-    """The first and the last stamp; None where there is none."""
+    """The first and the last stamp; None if there is none."""
     stamps = [float(t) for t in fixes.t_s if math.isfinite(t)]
     return (min(stamps), max(stamps)) if stamps else (None, None)
 

@@ -1,4 +1,4 @@
-"""One flight, as the command line flies it: refused early or flown, recorded, judged and told."""
+"""`wingslevel fly`: one flight, flown, recorded, judged and reported."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -31,8 +31,8 @@ LATE_SHARE = 0.05  # of the updates; a few are late on any machine that has othe
 class Flown:
     """A flight that was flown, recorded and judged; `shown` live, or not.
 
-    flight, folder : None where the process that flew it is gone, and nothing of it is left;
-    `folder` too where it could not be written
+    flight, folder : None if the process that flew it is gone, and nothing of it is left;
+    `folder` too if it could not be written
     """
 
     scenario: Scenario
@@ -115,14 +115,14 @@ def fly(
 
 
 def _nothing_of(scenario: Scenario, config: FlightConfig, outcome: Outcome, message: str) -> Flown:
-    """A flight of which nothing is left but how it ended."""
+    """A flight that was lost: only how it ended is known."""
     return Flown(
         scenario, None, FlightVerdict(scenario.name, config.estimator, config.seed, outcome, (), {}, message), None
     )
 
 
 def _warn_if_late(flight: Flight) -> None:
-    """Say that the estimator is too slow for its tick, where it often was."""
+    """Warn if the estimator was often slower than its tick."""
     ticks = len(flight.log)
     if flight.late > LATE_SHARE * ticks:
         console.error(
@@ -132,7 +132,7 @@ def _warn_if_late(flight: Flight) -> None:
 
 
 def print_report(flown: Flown) -> None:
-    """The verdict, how the flight ended, and where to see it."""
+    """Print the verdict, how the flight ended, and where to see it."""
     out, flight, judged = console.out(), flown.flight, flown.judged
     if flight is None:
         console.line(f"{judged.scenario}, {judged.estimator}, seed {judged.seed}: {judged.ending}", "bold red")

@@ -108,7 +108,7 @@ def _about_code(offer: Offer) -> str:
 def _about_scenario(offer: Offer) -> str:
     from scenarios.harness.registry import find
 
-    return find(offer.name).told_as
+    return find(offer.name).summary
 
 
 def _about_suite(offer: Offer) -> str:

@@ -1,4 +1,4 @@
-"""`wingslevel replay`: a log read, replayed by one estimator or several, recorded and told."""
+"""`wingslevel replay`: a log, replayed with one or more estimators, recorded and reported."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,11 +30,11 @@ _SHOWN = (
 
 @dataclass(frozen=True, slots=True)
 class Replays:
-    """A log and what the estimators made of it.
+    """A log and the results of the estimators.
 
-    folders : their recordings, by name, None where one was not, or could not be, written
-    flights : each replay as a flight, by name; of one that took its process with it there is none
-    not_judged : why nothing was judged, empty where something was
+    folders : their recordings, by name, None if one was not, or could not be, written
+    flights : each replay as a flight, by name; none for an estimator that ended its process
+    not_judged : why nothing was judged, empty if something was
     notes : what was set for some of the estimators alone, a line each
     """
 
@@ -48,7 +48,7 @@ class Replays:
 
     @property
     def exit_code(self) -> int:
-        """1 where an estimator failed, or nothing of the reference could be judged."""
+        """1 if an estimator failed, or nothing of the reference could be judged."""
         nothing = self.log.reference is not None and self.not_judged
         return 1 if nothing or any(r.failure for r in self.replays) else 0
 
@@ -107,7 +107,7 @@ def replay_log(
     if into is not None:
         recording.check_writable(into)
     log = logs.read(path, reference=reference, columns=columns, imu=imu)
-    for name in names:  # again with what the log tells: all are made before any is run
+    for name in names:  # again, with the properties in the log: all are made before any is run
         make(name, of_each[name], known_to(log, withheld))
     replays: list[Replayed] = []
     for name in names:
@@ -138,42 +138,42 @@ def _place(folder: Path | None) -> str | None:
 
 
 def _ground_too(log: RecordedLog) -> list[str]:
-    """A line where the log has fixes and none of them is usable: nothing then tells flight from ground."""
+    """A note if no fix of the log is usable: flight and ground cannot be told apart then."""
     fixes = log.ledger.get("gps")
     if fixes is None or not fixes.read or fixes.used:
         return []
     return ["none of the fixes is usable: all rows are judged, those on the ground too"]
 
 
-def print_report(told: Replays) -> None:
+def print_report(replays: Replays) -> None:
     """The log, what was repaired in it, the table, and where the recordings are."""
-    out, log = console.out(), told.log
+    out, log = console.out(), replays.log
     length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
     console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}")
     for line in log.notes:
         console.line(f"note        {line}")
     for line in log.repairs:
         console.line(f"repaired    {line}", "yellow")
-    for line in told.notes:
+    for line in replays.notes:
         console.line(f"note        {line}")
     if len(log.ledger):
         columns = ("", "read", "used", "left out")
         out.print(console.table("samples in the log", columns, _books(log), text=(0, 3), wrapping=(3,)))
     if log.reference is not None:
-        console.line(f"against     {log.reference.name}, {told.judged_s:.1f} s of it judged")
-    rows = [_row(replayed) for replayed in told.replays]
+        console.line(f"against     {log.reference.name}, {replays.judged_s:.1f} s of it judged")
+    rows = [_row(replayed) for replayed in replays.replays]
     out.print(console.table("differences from the reference, degrees", _HEADINGS, rows, wrapping=(0,)))
-    console.print_known({replayed.estimator: replayed.known for replayed in told.replays})
-    for replayed in told.replays:
+    console.print_known({replayed.estimator: replayed.known for replayed in replays.replays})
+    for replayed in replays.replays:
         if replayed.refused:
             refused = ", ".join(f"{n} {name}" for name, n in replayed.refused.items())
-            console.line(f"not believed by {replayed.estimator}: {refused} samples")
+            console.line(f"rejected by {replayed.estimator}: {refused} samples")
         if replayed.failure:
             console.line(f"{replayed.estimator} failed: {replayed.failure}", "bold red")
-    if told.not_judged:
+    if replays.not_judged:
         style = "bold red" if log.reference is not None else "yellow"
-        console.line(f"nothing judged: {told.not_judged}", style)
-    for folder in filter(None, told.folders.values()):
+        console.line(f"nothing judged: {replays.not_judged}", style)
+    for folder in filter(None, replays.folders.values()):
         console.line(f"recording   {folder}")
 
 

@@ -37,7 +37,7 @@ class Subject:
     """What a page is about.
 
     members : kind -> part, of a suite; empty for a part      devices : kind -> parameters
-    sources : ``kind.field`` -> where the figure comes from; empty where there is no data sheet
+    sources : ``kind.field`` -> where the figure comes from; empty if there is no data sheet
     settings : of a suite, what it says of its board, its converter and single figures, by dotted names
     board : that the parts sit on
     """
@@ -54,7 +54,7 @@ class Subject:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """Everything on the page; None and empty where it has no such sensor."""
+    """Everything on the page; None and empty if it has no such sensor."""
 
     subject: Subject
     at_rest: Mapping[str, AtRest]
@@ -64,7 +64,7 @@ class Page:
     air: AirTrial | None
 
     def to_json(self) -> dict[str, Any]:
-        """The page as numbers named with their units; None where the data sheet is silent."""
+        """The page as numbers named with their units; None if the data sheet is silent."""
         about = self.subject
         data: dict[str, Any] = {"suite" if about.members else "part": about.name, "about": about.about}
         if about.members:
@@ -259,7 +259,7 @@ def _setting(name: str) -> str:
 
 
 def _figures(about: Subject, kind: str) -> Any:
-    """Figures of the data sheet, or all of them where there is none."""
+    """Figures of the data sheet, or all of them if there is none."""
     params = about.devices[kind]
     rows = []
     for f in fields(params):

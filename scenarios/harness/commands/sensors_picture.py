@@ -29,7 +29,7 @@ Panel = Callable[[Any], None]
 
 
 def draw(page: Page, path: Path) -> None:
-    """Draw the page into `path`; its ending says the format.  ValueError where it has nothing to draw."""
+    """Draw the page into `path`; its ending says the format.  ValueError if it has nothing to draw."""
     rows = _rows(page)
     if not rows:
         raise ValueError(f"{page.subject.name}: there is nothing to draw of it")

@@ -24,7 +24,7 @@ def write_rerun(flight: Flight, folder: Path) -> Path:
 
 
 def newest(below: Path) -> Path:
-    """The recording below the folder `below` that was written last; ValueError where there is none."""
+    """The recording below the folder `below` that was written last; ValueError if there is none."""
     found = below.glob(f"*/{recording.PARQUET}")
     latest = max(found, key=lambda path: path.stat().st_mtime, default=None)
     if latest is None:
@@ -33,7 +33,7 @@ def newest(below: Path) -> Path:
 
 
 def open_flight(path: Path, *, web: bool) -> "Viewer":
-    """Open the recording at `path`; from its Parquet, where it has not been written for Rerun yet.
+    """Open the recording at `path`; written from its Parquet if there is no Rerun recording yet.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def open_flight(path: Path, *, web: bool) -> "Viewer":
 
 
 def stay(viewer: "Viewer") -> None:
-    """Say where to look; serve a browser until Ctrl-C, leave a window to itself."""
+    """Print the address; serve a browser until Ctrl-C, or leave the window open."""
     if viewer.address is None:
         return
     console.out().print(f"open {viewer.address}   (Ctrl-C ends it)", soft_wrap=True)

@@ -1,7 +1,7 @@
-"""The process around a command: whatever becomes of the one that runs flight code, a verdict or an error comes out.
+"""The process around a command: whatever happens to the one that runs flight code, a verdict or an error comes out.
 
-Flight code can end its process (``os._exit``, a crash in C), hang it where no signal is answered, or write to its
-standard output.  So a command runs in a child, and the parent, which runs nobody's code, has the last word:
+Flight code can end its process (``os._exit``, a crash in C), hang it without answering signals, or write to its
+standard output.  So a command runs in a child, and the parent, which runs no flight code, decides the exit code:
 
 - the child says when it is done, and with which exit code; one that ends without a word never counts as passed;
 - what is watched (`watched`) and ends the child, or takes too long, is recorded in `lost`, and the command is run once
@@ -9,7 +9,7 @@ standard output.  So a command runs in a child, and the parent, which runs nobod
 - JSON for standard output passes through the parent (`publish`): the child has no hand on it;
 - Ctrl-C, SIGTERM and SIGHUP are passed on; when the parent is killed, the child is too.
 
-Where the system cannot fork, and where a command is called from Python, it runs unguarded.
+Where the system cannot fork, and when a command is called from Python, it runs unguarded.
 
 This module is imported before anything heavy, and must stay so.
 """
@@ -32,14 +32,14 @@ from sim.outside.wording import described, printable
 
 FAILED, USAGE, BROKEN, INTERRUPTED = 1, 2, 3, 130  # exit codes
 _COMPLETE = "_WINGSLEVEL_COMPLETE"  # set by a shell that wants half a line completed: nothing is flown
-GRACE_S = 5.0  # what a process gets to end by itself
+GRACE_S = 5.0  # time for a process to end by itself
 _LOOK_S = 0.2
 
 UNPREPARED = "before anything was flown or written; does flight code or a scenario file end it?"
 
 
 class Lost(NamedTuple):
-    """Something watched that ended its process, or had to be ended with it.
+    """Something watched that ended its process, or was killed with it.
 
     timed_out : whether its time was up; else its process is gone       message : one line
     """
@@ -49,14 +49,14 @@ class Lost(NamedTuple):
 
 
 class _Child(NamedTuple):
-    """What the command's process knows of the one around it."""
+    """What the command's process knows of its parent."""
 
     channel: int
     token: str  # frames without it are not ours: flight code may write to any descriptor
 
 
 class _Heard:
-    """What the parent has heard of a child."""
+    """What the parent knows of a child."""
 
     done: int | None = None
     stage: str = UNPREPARED
@@ -83,7 +83,7 @@ def main() -> None:
 
 
 def guarded(command: Callable[[], int]) -> int:
-    """Run `command` in a process of its own; its exit code, or what stands for it where it ended without a word."""
+    """Run `command` in a process of its own; its exit code, or one that never passes if it ended unexpectedly."""
     if not hasattr(os, "fork") or _COMPLETE in os.environ:
         return command()
     while True:
@@ -102,7 +102,7 @@ def guarded(command: Callable[[], int]) -> int:
 
 @contextlib.contextmanager
 def watched(what: str, limit_s: float | None = None) -> Iterator[None]:
-    """Should the process end inside the block, or be at it for longer than `limit_s`: `what` is lost, and no more."""
+    """If the process ends inside the block, or stays in it for longer than `limit_s`, only `what` is lost."""
     _send(watched=what, limit_s=limit_s)
 
     def extend(seconds: float) -> None:
@@ -117,12 +117,12 @@ def watched(what: str, limit_s: float | None = None) -> Iterator[None]:
 
 
 def stage(when: str, code: int) -> None:
-    """From here on, a process that ends without a word did so `when`, and the exit code is `code`."""
+    """From here on, a process that ends unexpectedly did so `when`, and the exit code is `code`."""
     _send(stage=when, code=code)
 
 
 def guarding() -> bool:
-    """Whether there is a parent that has standard output."""
+    """Whether a parent holds standard output."""
     return _child is not None
 
 
@@ -138,7 +138,7 @@ def _send(**frame: Any) -> bool:
     try:
         while data:
             data = data[os.write(_child.channel, data) :]
-    except OSError:  # flight code has closed the channel: the parent hears nothing, and passes nothing
+    except OSError:  # flight code has closed the channel: the parent hears nothing, so nothing passes
         return False
     return True
 
@@ -195,11 +195,11 @@ def _live(command: Callable[[], int], child: _Child, signals: list[signal.Signal
         code = BROKEN if code is None else code
         _flush()
         _send(done=code)
-        os._exit(code)  # without atexit: whatever flight code left there, or in threads, has no say
+        os._exit(code)  # without atexit: flight code may have left functions or threads there
 
 
 def _flush() -> None:
-    """Flush what is printed; a reader that has gone away is no fault."""
+    """Flush standard output and error; a closed pipe is not an error."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):
             stream.flush()
@@ -250,7 +250,7 @@ def _take(line: bytes, token: str, heard: _Heard) -> None:
 
 
 def _write(text: str, heard: _Heard) -> None:
-    """Write `text` to standard output; a reader that has gone away is no fault."""
+    """Write `text` to standard output; a closed pipe is not an error."""
     data = text.encode("utf-8", "backslashreplace")
     try:
         while data:

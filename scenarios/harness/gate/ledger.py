@@ -1,4 +1,4 @@
-"""The verdicts on flights, kept as they come: one small file for each, so that a command can go on where it ended.
+"""A ledger of verdicts: one small file per flight, written as it finishes, so that an interrupted command can resume.
 
 A file is found by the fingerprint of all that decides its flight (see `sources`): after an edit, nothing old is taken.
 It is written beside its place and renamed, so that it is there complete or not at all; one that has been damaged
@@ -27,7 +27,7 @@ _NUMBERS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
 
 @dataclass(frozen=True, slots=True)
 class Ledger:
-    """A folder of verdicts; made where it is missing.
+    """A folder of verdicts, created if needed.
 
     Raises
     ------

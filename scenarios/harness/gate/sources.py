@@ -1,8 +1,7 @@
-"""What decides a flight, as a fingerprint: its scenario, its configuration, all code that flies in it, the versions.
+"""A fingerprint of everything that decides a flight: scenario, configuration, flight code and versions.
 
-Code of the project and code of others are read alike: the file that a name stands for, the other Python files of its
-folder (of its whole package, where it is one), and every module of others that these have imported so far.  Data files
-that flight code reads by itself are not seen.
+The project and other code are treated alike: the file behind a name, the other Python files of its folder (or of its
+whole package), and every module that these have imported.  Data files that flight code reads are not covered.
 """
 
 import hashlib
@@ -141,7 +140,7 @@ def _file_of(module: ModuleType) -> Path | None:
 
 
 def _hash(files: Iterable[Path], root: Path | None) -> str:
-    """Over the names, below `root` where there is one, and the contents of `files`."""
+    """Over the names, below `root` if there is one, and the contents of `files`."""
     digest = hashlib.sha256()
     for path in sorted(set(files)):
         name = path.relative_to(root).as_posix() if root is not None else path.name

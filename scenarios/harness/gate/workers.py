@@ -1,4 +1,4 @@
-"""Tasks over several processes, where a process that dies or hangs costs one task and no more.
+"""Tasks over several processes: a process that dies or hangs costs one task.
 
 Each worker is a pool of one process: when the process is gone, whatever its exit code, its one task is known, is
 given to a new process once more, and is then reported as lost.  (pebble 5.2 offers the same for any number of
@@ -39,11 +39,11 @@ class Flyable(Protocol[_Tells]):
     """A task that can be sent to a process."""
 
     def fly(self) -> _Tells:
-        """Fly it, and say what is to be known of it."""
+        """Fly it, and return the result."""
         ...
 
     def lost(self, outcome: Outcome, message: str) -> _Tells:
-        """What is to be known of it where nothing came back; `message` is one line."""
+        """The result if the process was lost; `message` is one line."""
         ...
 
 
@@ -64,13 +64,13 @@ def fly_each(
     limit_s         wall-clock limit of each task; None is no limit
     interrupted     whether a result is that of a task that was interrupted: it ends the rest
     keep            is handed each result as it comes, with the number of its task
-    advance         is told how many are done, of how many
+    advance         is called with the number done and the total
     """
     if _Worker.inside:
         raise ValueError('a worker process cannot start others: put such calls under if __name__ == "__main__":')
     results = _results(tasks, min(workers, len(tasks)), limit_s) if workers else _here(tasks, limit_s)
     done: dict[int, _Result] = {}
-    with contextlib.suppress(KeyboardInterrupt):  # what is finished counts; the caller sees that some are missing
+    with contextlib.suppress(KeyboardInterrupt):  # finished tasks count; the caller sees that some are missing
         for i, result in results:
             if interrupted(result):
                 break
@@ -122,7 +122,7 @@ def _results(tasks: Sequence[Flyable[_Result]], workers: int, limit_s: float | N
 
 
 def _wait(crew: "Sequence[_Worker[Any]]") -> None:
-    """Until there is something to look at."""
+    """Wait until a task may have finished."""
     futures = [worker.future for worker in crew if worker.future is not None]
     deadlines_s = [worker.deadline_s for worker in crew if worker.deadline_s is not None]
     timeout_s = max(0.0, min(deadlines_s) - time.monotonic()) if deadlines_s else None
@@ -139,13 +139,13 @@ class _Gone:
 
 @dataclass(frozen=True, slots=True)
 class _Told(Generic[_Result]):
-    """What came back of a task."""
+    """The result of a task."""
 
     result: _Result
 
 
 class _Worker(Generic[_Result]):
-    """One process, begun anew when it is gone, and the task that it is at.
+    """One process, restarted when it dies, and its current task.
 
     inside : whether this process is one
     """
@@ -158,11 +158,11 @@ class _Worker(Generic[_Result]):
         self.future: Future[Any] | None = None
         self.deadline_s: float | None = None
         self._limit_s = limit_s
-        self._told = told  # shared by all processes: whether somebody has said that kernels are being compiled
+        self._told = told  # shared by all processes: whether the compile line has been printed
         self._task: Flyable[_Result] | None = None
         self._pool: ProcessPoolExecutor | None = None
         self._process: Any = None
-        self._extended_s: Any = None  # shared with the process: what the compiler took of the time of its task
+        self._extended_s: Any = None  # shared with the process: compile time, which does not count against the limit
 
     def take(self, number: int, task: Flyable[_Result]) -> None:
         """Begin with a task; the time that a new process takes to start does not count."""
@@ -179,7 +179,7 @@ class _Worker(Generic[_Result]):
         """Start a process; it begins with the task when it is ready."""
         # Spawned, not forked: numba's threads and JSBSim's globals do not survive a fork.
         context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
-        # Without locks: a process that is killed while it holds one would hold up everybody.
+        # Without locks: a process killed while holding one would block the others.
         self._extended_s = context.Value("d", 0.0, lock=False)
         arguments = os.getpid(), self._extended_s, self._told, tracebacks_shown(), lent.packed()
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_set_up, initargs=arguments)
@@ -188,7 +188,7 @@ class _Worker(Generic[_Result]):
         self._process = next(iter(set(multiprocessing.active_children()) - others), None)
 
     def look(self) -> "_Told[_Result] | _Gone | None":
-        """What has become of the task; None while it is not decided."""
+        """The result of the task; None while it runs."""
         if self.future is None:
             return None
         if not self.future.done():
@@ -214,7 +214,7 @@ class _Worker(Generic[_Result]):
         return _Told(result)
 
     def end(self) -> None:
-        """End the process, whatever it is at."""
+        """Kill the process."""
         self.busy, self.future, self.deadline_s = False, None, None
         if self._pool is None:
             return
@@ -245,7 +245,7 @@ class _Worker(Generic[_Result]):
 
 @contextlib.contextmanager
 def _held_back() -> Iterator[None]:
-    """Start a process inside the block that never hears Ctrl-C: the parent decides what becomes of it."""
+    """A process started inside the block ignores Ctrl-C: the parent decides when it ends."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -293,7 +293,7 @@ def _set_up(parent: int, extended_s: Any, told: Any, tracebacks: bool, makers: d
     compiling.on_compile(tell)
     compiling.on_trouble(lambda line: console.error(f"kernel cache: {line}"))
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _leave)  # a dead process, not a flight that was interrupted
+    signal.signal(signal.SIGTERM, _leave)  # counts as a dead process, not as an interrupted flight
     with contextlib.suppress(OSError):
         os.dup2(2, 1)  # standard output may be carrying JSON
     sys.stdout = sys.stderr
@@ -304,7 +304,7 @@ def _leave(_number: int, _frame: FrameType | None) -> None:
 
 
 def _fly(task: Flyable[_Result], limit_s: float | None) -> _Result:
-    """In the process: the result of the task, whatever is raised."""
+    """In the worker process: the result of the task, whatever it raises."""
     try:
         with limited(limit_s):
             return task.fly()
