@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning
     from wingslevel._flight import Flight
     from wingslevel._flying import fly, load
-    from wingslevel._names import autopilots, estimators, scenarios
+    from wingslevel._names import autopilots, estimators, parameters, scenarios
     from wingslevel._pages import export, view
     from wingslevel._replaying import Replay, replay
     from wingslevel._results import CheckResult, Comparison
@@ -79,7 +79,7 @@ _HOMES = {
     "wingslevel._errors": ("Interrupted", "WingslevelError", "WingslevelWarning"),
     "wingslevel._flight": ("Flight",),
     "wingslevel._flying": ("fly", "load"),
-    "wingslevel._names": ("autopilots", "estimators", "scenarios"),
+    "wingslevel._names": ("autopilots", "estimators", "parameters", "scenarios"),
     "wingslevel._pages": ("export", "view"),
     "wingslevel._replaying": ("Replay", "replay"),
     "wingslevel._results": ("CheckResult", "Comparison"),
@@ -115,6 +115,7 @@ __all__ = [
     "export",
     "fly",
     "load",
+    "parameters",
     "replay",
     "scenarios",
     "view",

@@ -116,7 +116,7 @@ def test_check_says_what_it_left_out() -> None:
 def test_campaigns_print_nothing(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Neither here nor in worker processes."""
     wl.check("crosswind", seeds=0, duration=1, workers=2)
-    with pytest.warns(wl.WingslevelWarning, match="never met"):
+    with pytest.warns(wl.WingslevelWarning, match="never happens"):
         wl.compare("crosswind", ["gyro_only", Level], seeds=0, duration=1, faults="gps:outage@30", workers=1)
     flight = wl.fly("hand_launch", duration=2)
     wl.replay(flight.save(tmp_path), ["premerlani", Level])
