@@ -49,9 +49,9 @@ from autopilot.interface import (
     RETURN,
     WAYPOINTS,
 )
-from estimator.blocks.screening import GYRO_RANGE_RAD_S
 from estimator.compiler.jit import kernel
 from estimator.interface import GOOD, POOR
+from estimator.params.shared import GYRO_RANGE_RAD_S
 from estimator.rotation import integrate
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from autopilot.energy import hold_height, throttle_for
 from autopilot.guidance import height
-from estimator.blocks.screening import FORCE_RANGE_M_S2
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2
+from estimator.params.shared import FORCE_RANGE_M_S2
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,29 +9,18 @@ References
 W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009, section "Accelerometers".
 """
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    FORCE_RANGE_M_S2,
-    GYRO_RANGE_RAD_S,
-    SCREEN,
-    attitude_at_rest,
-    offset_at_rest,
-    screen,
-    screen_gyro,
-    take_rate,
-)
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
+from estimator.blocks.screening import FORCE_GOOD, health_of, screen, screen_gyro, take_rate
 from estimator.compiler.jit import kernel
-from estimator.interface import Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import Column, ImuSample, Instrument
+from estimator.params.shared import Params
 from estimator.rotation import integrate, level, renormalise
 
-STATE_DTYPE = dtype_of(
-    (*BELIEF, *SCREEN, Column("tilt_from_force", (), "1 where the accelerometer sets the tilt", integer=True))
-)
+STATE_DTYPE = state_dtype(Params, Column("tilt_from_force", (), "1 if the accelerometer sets the tilt", integer=True))
 
 
 @kernel
@@ -65,41 +54,29 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         integrate(s.R_eb, s.omega_b_rad_s, s.dt_s)
         if good & FORCE_GOOD:
             lean_on_force(s.R_eb, row.force_b_m_s2)
-    return 2 if s.spoilt else 1  # Health.POOR, Health.GOOD
+    return health_of(s, True, True)
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class GyroOnly(Compiled):
-    """Eqns 16-21 without drift correction: gyros from power-up on, the offset measured there."""
+class GyroOnly(Compiled[None]):
+    """Eqns 16-21 without drift correction: gyros from power-up on, less the offset measured there."""
 
-    heading_reference: HeadingReference = "nose"
+    heading_reference = "nose"
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro",)
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
     _tilt_from_force = False
 
-    def __init__(self) -> None:
-        super().__init__(STATE_DTYPE)
-        self.reset()
-
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample of something at rest; without, zero and level."""
-        s = self._state[0]
-        self._state.fill(0)
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
         s["tilt_from_force"] = self._tilt_from_force
-        s["gyro_range_rad_s"], s["force_range_m_s2"] = GYRO_RANGE_RAD_S, FORCE_RANGE_M_S2
-        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        s["gyro_bias_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
 
 
 class AccelerometerOnly(GyroOnly):
-    """Tilt straight from the accelerometer at every sample, heading from the gyros."""
+    """Tilt from the accelerometer alone at every sample, heading from the gyros."""
 
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer")
+    uses = ("gyro", "accelerometer")
     _tilt_from_force = True

@@ -21,27 +21,17 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 """
 
 import math
-from dataclasses import asdict, dataclass, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    FORCE_RANGE_M_S2,
-    GPS,
-    GYRO_RANGE_RAD_S,
-    SCREEN,
-    attitude_at_rest,
-    offset_at_rest,
-    refuse,
-    screen,
-    take_rate,
-)
+from estimator.blocks.screening import FORCE_GOOD, GPS, refuse, screen, take_rate
 from estimator.compiler.jit import kernel
-from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Column, ImuSample
+from estimator.params.shared import Params
 from estimator.rotation import integrate
 
 MIN_SPEED_M_S = 3.0  # a slower course says nothing about the heading
@@ -53,42 +43,34 @@ ALIGNED = 0.3  # sine of the heading error below which the heading counts as fou
 
 
 @dataclass(frozen=True, slots=True)
-class ComplementaryParams:
-    """What can be tuned: ``--set tilt_s=10``.
+class ComplementaryParams(Params):
+    """What can be tuned: ``--set tilt_s=10``.  `wingslevel list estimators --params` shows these texts.
 
-    tilt_s : float          s, time constant of the tilt correction.  Raised: smoother, less disturbed by manoeuvres,
-                            slower to recover.  Lowered: recovers sooner, follows accelerations that are not gravity
-    heading_s : float       s, the same for the heading.  Raised: less course noise.  Lowered: heading found sooner
-    bias_s : float          s, time constant of the gyro bias.  Raised: steadier bias.  Lowered: follows a drifting
-                            gyro, overshoots after a large tilt error; keep it above 4 tilt_s
-    gps_latency_s : float   s, age of a fix on arrival; set from the data sheet of the receiver.  Too low or too high:
-                            the heading lags or leads in turns
-    gps_filter_s : float    s, time constant of the receiver's velocity filter; likewise
+    tilt_s : s  time constant of the tilt correction
+        higher: smoother, less disturbed by manoeuvres, slower to recover; lower: follows accelerations too
+    heading_s : s  time constant of the heading correction
+        higher: less course noise; lower: the heading is found sooner
+    bias_s : s  time constant of the gyro bias; keep it above 4 tilt_s
+        higher: steadier bias; lower: follows a drifting gyro, overshoots after a large tilt error
+    gps_latency_s : s  age of a fix on arrival, set from the data sheet of the receiver
+        higher: more of the turn since then is added to the course; lower: less.  An error turns the heading in turns
+    gps_filter_s : s  time constant of the receiver's velocity filter, likewise
+        higher: as for the latency; lower: as for the latency
     """
 
+    _positive: ClassVar = ("tilt_s", "heading_s", "bias_s")
     tilt_s: float = 5.0
     heading_s: float = 2.0
     bias_s: float = 20.0
     gps_latency_s: float = 0.3
     gps_filter_s: float = 0.0
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value, of_receiver = getattr(self, field.name), field.name.startswith("gps_")
-            if not (0.0 <= value < math.inf if of_receiver else 0.0 < value < math.inf):
-                raise ValueError(f"{field.name} is {value} s; it must be {'0 or more' if of_receiver else 'above 0'}")
 
-
-_PARAMS = tuple(Column(field.name, (), "see ComplementaryParams") for field in fields(ComplementaryParams))
-STATE_DTYPE = dtype_of(
-    (
-        *BELIEF,
-        *SCREEN,
-        *_PARAMS,
-        Column("v_e_m_s", (3,), "velocity of the last fix"),
-        Column("fix_age_s", (), "time since it arrived"),
-        Column("aligned", (), "1 once the heading has been near the course", integer=True),
-    )
+STATE_DTYPE = state_dtype(
+    ComplementaryParams,
+    Column("v_e_m_s", (3,), "velocity of the last fix"),
+    Column("fix_age_s", (), "time since it arrived"),
+    Column("aligned", (), "1 once the heading has been near the course", integer=True),
 )
 
 
@@ -138,7 +120,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     row, s = rows[k], state[0]
     good = screen(row, s)  # which of this sample can be believed
     if not good:
-        return 2  # no time has passed
+        return POOR  # no time has passed
     take_rate(row, s, good)  # omega_b_rad_s = gyro - bias
     take_fix(row, s)
     x, y, z = tilt_error(row.force_b_m_s2, s) if good & FORCE_GOOD else (0.0, 0.0, 0.0)
@@ -151,37 +133,23 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     for i, tilt in enumerate((x, y, z)):
         s.gyro_bias_b_rad_s[i] = clip(s.gyro_bias_b_rad_s[i] - learn * tilt, -MAX_BIAS_RAD_S, MAX_BIAS_RAD_S)
     if not s.aligned:
-        return 0  # Health.STARTING
-    return 2 if s.spoilt or s.fix_age_s > FIX_LIFE_S else 1  # Health.POOR, Health.GOOD
+        return STARTING
+    return POOR if s.spoilt or s.fix_age_s > FIX_LIFE_S else GOOD
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class Complementary(Compiled):
-    """The filter as the loop calls it; `Compiled` has ``update``, ``replay``, ``snapshot`` and the counters."""
+class Complementary(Compiled[ComplementaryParams]):
+    """The filter as the loop calls it; `Compiled` has ``reset``, ``update``, ``replay`` and the counters."""
 
-    heading_reference: HeadingReference = "course"
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps")
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
+    heading_reference = "course"
+    uses = ("gyro", "accelerometer", "gps")
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = ComplementaryParams()
 
-    def __init__(self, params: ComplementaryParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or ComplementaryParams()
-        self.reset()
-
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: tilt and gyro bias from the mean sample at rest, or level and zero in the air; heading north."""
-        s = self._state[0]
-        self._state.fill(0)
-        for name, value in asdict(self.params).items():
-            s[name] = value
-        s["gyro_range_rad_s"], s["force_range_m_s2"] = GYRO_RANGE_RAD_S, FORCE_RANGE_M_S2
-        s["fix_age_s"] = math.inf
-        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        s["gyro_bias_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
+        s["fix_age_s"] = math.inf  # tilt and gyro bias are set from the mean sample on the ground

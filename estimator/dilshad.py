@@ -50,35 +50,17 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 """
 
 import math
-from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import wrap
-from estimator.blocks.magnetometer import (
-    FIELD,
-    FIELD_RANGE_UT,
-    Calibration,
-    take_field,
-    turn_to_north,
-    write_calibration,
-)
+from estimator.blocks.magnetometer import FIELD, take_field, turn_to_north
 from estimator.blocks.pi import corrected_rate, feed_back, weigh
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    FORCE_RANGE_M_S2,
-    GPS,
-    GYRO_RANGE_RAD_S,
-    SCREEN,
-    attitude_at_rest,
-    offset_at_rest,
-    refuse,
-    screen,
-)
+from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen
 from estimator.compiler.jit import kernel
-from estimator.interface import Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import Array, Column, HeadingReference, ImuSample
+from estimator.params.dilshad import DilshadParams as DilshadParams
 from estimator.rotation import integrate
 
 HEADING_LIFE_S = 1.0  # a magnetometer silent for longer corrects nothing any more
@@ -86,55 +68,7 @@ STRAIGHT_RAD = math.radians(10.0)  # a nose that has turned further than this si
 LONGEST_STEP_S, FASTEST_M_S = 2.5, 300.0  # between two positions that tell a velocity
 
 
-@dataclass(frozen=True, slots=True)
-class DilshadParams:
-    """Gains, and what the sensors are.
-
-    w_rp, w_y : float          weights of the roll-pitch and the yaw correction.  Large: errors go quickly, but
-                               accelerations and the field's disturbances get in
-    k_p, k_i : float           gains, 1/s and 1/s^2.  k_i / k_p is how fast a gyro offset is learnt
-    offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
-    yaw_every_s : float        shortest mean time between two magnetometer headings; the paper's 125 ms
-    calibration                of the magnetometer
-    declination_rad : float    of magnetic from true north, positive east; the GPS finds what is missing
-    gps_weight_s : float       time over which courses correct the magnetometer; inf: they do not
-    gps_lag_s : float          age of a course from three positions: filter, latency and one interval
-    min_speed_m_s : float      slowest ground speed, the receiver's, at which a course means anything
-    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
-    """
-
-    w_rp: float = 0.3
-    w_y: float = 0.6
-    k_p: float = 1.0
-    k_i: float = 0.02
-    offset_limit_rad_s: float = math.radians(6.0)
-    yaw_every_s: float = 0.125
-    calibration: Calibration = field(default_factory=Calibration)
-    declination_rad: float = 0.0
-    gps_weight_s: float = 20.0
-    gps_lag_s: float = 1.4
-    min_speed_m_s: float = 3.0
-    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
-    force_range_m_s2: float = FORCE_RANGE_M_S2
-    field_range_ut: float = FIELD_RANGE_UT
-
-    def __post_init__(self) -> None:
-        for name in ("w_rp", "w_y", "k_p", "k_i", "yaw_every_s", "min_speed_m_s"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, zero or more")
-        for name in ("offset_limit_rad_s", "gps_lag_s", "gyro_range_rad_s", "force_range_m_s2", "field_range_ut"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, more than zero")
-        if not self.gps_weight_s > 0.0:
-            raise ValueError(f"gps_weight_s is {self.gps_weight_s} s; it must be more than zero")
-        if not abs(self.declination_rad) <= math.pi:
-            raise ValueError(f"declination_rad is {self.declination_rad} rad; it must be -pi to pi")
-
-
-_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
-_OF_PARAMS = tuple(f.name for f in fields(DilshadParams) if f.name not in ("calibration", *_RANGES))
 _STATE = (
-    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
     Column("omega_p_b", (3,), "proportional rate correction"),
     Column("omega_i_b", (3,), "integral rate correction; minus the offset still found"),
     Column("omega_total_b", (3,), "corrected rate that is integrated"),
@@ -152,15 +86,7 @@ _STATE = (
     Column("courses", (), "courses taken so far", integer=True),
     Column("aligned", (), "1 once the magnetometer has set the heading", integer=True),
 )
-STATE_DTYPE = dtype_of(
-    (
-        *BELIEF,
-        *SCREEN,
-        *FIELD,
-        *(Column(name, (), "see DilshadParams") for name in _OF_PARAMS),
-        *_STATE,
-    )
-)
+STATE_DTYPE = state_dtype(DilshadParams, *FIELD, *_STATE)
 
 
 @kernel
@@ -261,7 +187,6 @@ def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One sample, in the order of the paper's Fig. 8; returns the `Health`."""
     row, s = rows[k], state[0]
-    before = s.rejected
     good = screen(row, s)
     if good:
         corrected_rate(row, s, good)
@@ -276,18 +201,13 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             s.yaw_b[i] = s.drift * s.R_eb[2, i]  # Premerlani's Eqn 24
         weigh(s.w_rp, s.roll_pitch_b, s.w_y, s.yaw_b, s.total_b)
         feed_back(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
-    if s.rejected != before:
-        return 2  # Health.POOR
-    if not s.aligned:
-        return 0  # Health.STARTING
-    return 1 if s.heading_age_s <= HEADING_LIFE_S else 2  # Health.GOOD
+    return health_of(s, s.aligned, s.heading_age_s <= HEADING_LIFE_S)
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
 def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
@@ -301,33 +221,22 @@ def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
     return np.arctan2(r_zy, r_yy), -np.arctan2(r_xz, r_xx), np.arcsin(np.clip(r_xy, -1.0, 1.0))
 
 
-class Dilshad(Compiled):
-    """Dilshad and Jahan (2014): yaw by the magnetometer, no centrifugal term; see the module."""
+class Dilshad(Compiled[DilshadParams]):
+    """Dilshad and Jahan (2014): yaw by the magnetometer, no centrifugal term; see the module.
+
+    The first field sets the heading.
+    """
 
     heading_reference: HeadingReference = "course"  # in the long run, through the GPS; "nose" without its correction
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer")
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
+    uses = ("gyro", "accelerometer", "gps", "magnetometer")
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = DilshadParams()
 
     def __init__(self, params: DilshadParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or DilshadParams()
+        super().__init__(params)
         if math.isinf(self.params.gps_weight_s):
             self.heading_reference = "nose"
-        self.reset()
 
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample of something at rest; the first field sets the heading.
-
-        Without a sample (a start in the air), or where it is not of something at rest: offset zero, level.
-        """
-        s = self._state[0]
-        self._state.fill(0)
-        for name in (*_OF_PARAMS, *_RANGES):
-            s[name] = getattr(self.params, name)
-        write_calibration(self._state, self.params.calibration)
-        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
-        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
         s["heading_age_s"] = s["p_age_s"] = math.inf
         s["heading_due_s"] = s["yaw_every_s"]

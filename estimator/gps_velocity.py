@@ -31,15 +31,12 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 """
 
 import math
-from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.gyro_frame import (
     GYRO_FRAME,
-    LONGEST_LATENCY_S,
     apply_corrections,
     attitude,
     recall,
@@ -47,22 +44,16 @@ from estimator.blocks.gyro_frame import (
     sum_up,
     to_earth,
 )
-from estimator.blocks.magnetometer import FIELD, FIELD_RANGE_UT, Calibration, take_field
+from estimator.blocks.magnetometer import FIELD, take_field
 from estimator.blocks.pi import feed_back
-from estimator.blocks.screening import (
-    FORCE_RANGE_M_S2,
-    GPS,
-    GYRO_RANGE_RAD_S,
-    SCREEN,
-    attitude_at_rest,
-    offset_at_rest,
-    refuse,
-    screen,
-    take_rate,
-)
+from estimator.blocks.screening import GPS, health_of, refuse, screen, take_rate
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
-from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
+from estimator.params.gps_velocity import MAGNETOMETER as GPS_VELOCITY_MAGNETOMETER
+from estimator.params.gps_velocity import NOSE as GPS_VELOCITY_NOSE
+from estimator.params.gps_velocity import YAW_REFERENCES
+from estimator.params.gps_velocity import GpsVelocityParams as GpsVelocityParams
 
 FIX_LIFE_S = 2.5  # reports further apart are compared no more
 LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown
@@ -70,87 +61,8 @@ STAND_IN_S = 0.1  # how often the paper's correction is worked out where it stan
 LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this close for this long
 LEAST_DOWN = 0.3  # of gravity, in the vertical as felt
 COURSE, NOSE, MAGNETOMETER = 0, 1, 2
-YAW_REFERENCES = ("course", "nose", "magnetometer")
-
-_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
-
-YawReference = Literal["course", "nose", "magnetometer"]
-
-
-@dataclass(frozen=True, slots=True)
-class GpsVelocityParams:
-    """Gains and options; the receiver by default is what is assumed where nothing is known: `estimator.instruments`.
-
-    yaw_reference : str        what the heading converges to: "course", "nose" or "magnetometer"
-    w_rp, w_y : float          weights of the roll-pitch and the yaw error (Eqn 28 of the paper).  Large: errors go
-                               quickly, noise of the reports gets in
-    w_start : float            weight of the paper's roll-pitch correction while it stands in
-    k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
-    offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
-    integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
-    gps_filter_s : float       time constant of the receiver's velocity filter; 0 is none
-    gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
-    gps_vertical_velocity : bool   False: the receiver reports no vertical velocity; Eqn 4 then compares the horizontal
-                               components alone
-    launch_gate : float        the stand-in corrects nothing while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
-    min_speed_m_s : float      slowest speed at which a velocity tells a heading
-    declination_rad : float    of magnetic from true north, positive east; for the magnetometer
-    calibration                of the magnetometer
-    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
-    """
-
-    yaw_reference: YawReference = "course"
-    w_rp: float = 0.5
-    w_y: float = 1.0
-    w_start: float = 0.3
-    k_p: float = 1.0
-    k_i: float = 0.03
-    offset_limit_rad_s: float = math.radians(6.0)
-    integrate_below_rad_s: float = math.radians(60.0)
-    gps_filter_s: float = 0.0
-    gps_latency_s: float = 0.3
-    gps_vertical_velocity: bool = True
-    launch_gate: float = 0.2
-    min_speed_m_s: float = 3.0
-    declination_rad: float = 0.0
-    calibration: Calibration = field(default_factory=Calibration)
-    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
-    force_range_m_s2: float = FORCE_RANGE_M_S2
-    field_range_ut: float = FIELD_RANGE_UT
-
-    def __post_init__(self) -> None:
-        if self.yaw_reference not in YAW_REFERENCES:
-            raise ValueError(f"yaw_reference is {self.yaw_reference!r}; it must be one of {', '.join(YAW_REFERENCES)}")
-        positive = (
-            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "gyro_range_rad_s", "force_range_m_s2",
-            "field_range_ut",
-        )  # fmt: skip
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name in ("yaw_reference", "calibration", "gps_vertical_velocity"):
-                continue
-            if f.name == "declination_rad":
-                if not abs(value) <= math.pi:
-                    raise ValueError(f"declination_rad is {value} rad; it must be -pi to pi")
-            elif f.name in positive:
-                if not value > 0.0:
-                    raise ValueError(f"{f.name} is {value}; it must be more than zero")
-            elif not 0.0 <= value < math.inf:
-                raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
-        for name in _RANGES:
-            if getattr(self, name) > 1e4:
-                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
-        if self.gps_latency_s > LONGEST_LATENCY_S:
-            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
-
-
-_PARAMS = tuple(
-    Column(f.name, (), "see GpsVelocityParams", integer=f.name in ("yaw_reference", "gps_vertical_velocity"))
-    for f in fields(GpsVelocityParams)
-    if f.name not in ("calibration", *_RANGES)
-)
 _STATE = (
-    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
+    Column("yaw_reference", (), "COURSE, NOSE or MAGNETOMETER", integer=True),
     Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
     Column("since_fix_g_m_s", (3,), "left side of Eqn 3 over the last interval"),
     Column("fix_t_s", (), "when the last fix was true, by the clock of the state"),
@@ -167,7 +79,7 @@ _STATE = (
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
 )
-STATE_DTYPE = dtype_of(BELIEF + SCREEN + FIELD + WIND_FILTER + GYRO_FRAME + _PARAMS + _STATE)
+STATE_DTYPE = state_dtype(GpsVelocityParams, *FIELD, *WIND_FILTER, *GYRO_FRAME, *_STATE)
 
 
 @kernel
@@ -346,20 +258,9 @@ def take_mag(row, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def step(rows, k, state):  # type: ignore[no-untyped-def]
-    """One inertial sample, and the report that came with it.
-
-    Parameters
-    ----------
-    rows : shape (N,), MEASURED_DTYPE    not written
-    k : int                              the tick
-    state : shape (1,), STATE_DTYPE      read and written
-
-    Returns
-    -------
-    int    the `Health` of this tick's estimate
-    """
+    """One inertial sample, and the report that came with it; returns the `Health`."""
     row, s = rows[k], state[0]
-    before, t_before = s.rejected, s.t_s
+    t_before = s.t_s
     good = screen(row, s)
     if good:
         take_rate(row, s, good)  # Eqn 16
@@ -375,70 +276,42 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             s.locked = 0
         if not (s.locked and s.fix_age_s <= FIX_LIFE_S) and s.clock_s - s.stand_in_t_s >= STAND_IN_S:
             stand_in(s)
-    if s.rejected != before:
-        return 2  # Health.POOR
-    if not s.locked:
-        return 0  # Health.STARTING
-    return 1 if s.fix_age_s <= FIX_LIFE_S else 2  # Health.GOOD
+    return health_of(s, s.locked, s.fix_age_s <= FIX_LIFE_S)
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
-        write_wind(state[0], estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class GpsVelocity(Compiled):
-    """Premerlani's note of 2011: roll and pitch by the change of GPS velocity; see the module.
+class GpsVelocity(Compiled[GpsVelocityParams]):
+    """Premerlani's note of 2011: roll and pitch from the change of GPS velocity; see the module."""
 
-    Parameters
-    ----------
-    params : gains and options; the defaults suit a model aeroplane with a 1 s, 0.3 s late GPS.  `heading_reference`
-        follows from their `yaw_reference`: "course", or "nose" for the other two
-    """
-
-    heading_reference: HeadingReference = "course"
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
-    _default: ClassVar[GpsVelocityParams] = GpsVelocityParams()
+    heading_reference: HeadingReference = "course"  # "nose" with another `yaw_reference`
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = GpsVelocityParams()
 
     def __init__(self, params: GpsVelocityParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or self._default
+        super().__init__(params)
         self.heading_reference = "course" if self.params.yaw_reference == "course" else "nose"
-        self.reset()
 
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
-
-        Without a sample (a start in the air), or where it is not of something at rest: offset zero, level.
-        """
-        s = self._state[0]
-        self._state.fill(0)
-        for f in fields(Calibration):
-            s[f.name] = getattr(self.params.calibration, f.name)
-        for name in (*(column.name for column in _PARAMS), *_RANGES):
-            value = getattr(self.params, name)
-            s[name] = YAW_REFERENCES.index(value) if name == "yaw_reference" else value
-        R = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        start_gyro_frame(s, R)
-        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
-        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
+        s["yaw_reference"] = YAW_REFERENCES.index(self.params.yaw_reference)
+        start_gyro_frame(s)
         s["fix_age_s"] = math.inf
         s["fix_t_s"] = s["mag_t_s"] = -math.inf
-        s["stand_in_g"][3:] = R[:, 0]
+        s["stand_in_g"][3:] = s["R_eb"][:, 0]
 
 
 class GpsVelocityNose(GpsVelocity):
-    """The same, its heading that of the nose: the wind is learnt in turns and taken off the GPS velocity."""
+    """`GpsVelocity` whose heading is the nose's: the wind is learnt in turns and subtracted from the GPS velocity."""
 
-    _default = GpsVelocityParams(yaw_reference="nose")
+    _default = GPS_VELOCITY_NOSE
 
 
 class GpsVelocityMagnetometer(GpsVelocity):
-    """The same, its heading that of the nose, from the magnetometer."""
+    """`GpsVelocity` whose heading is the nose's, from the magnetometer."""
 
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer")
-    _default = GpsVelocityParams(yaw_reference="magnetometer")
+    uses = ("gyro", "accelerometer", "gps", "magnetometer")
+    _default = GPS_VELOCITY_MAGNETOMETER

@@ -49,29 +49,18 @@ IMU: Theory", 2009.
 """
 
 import math
-from dataclasses import fields
-from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip, wrap
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    GPS,
-    SCREEN,
-    attitude_at_rest,
-    offset_at_rest,
-    refuse,
-    screen,
-    take_rate,
-)
+from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen, take_rate
 from estimator.compiler.jit import kernel
-from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, dtype_of
-from estimator.matrixpilot_params import CLASSIC as CLASSIC
-from estimator.matrixpilot_params import UDB4 as UDB4
-from estimator.matrixpilot_params import UDB5 as UDB5
-from estimator.matrixpilot_params import MatrixPilotParams
+from estimator.interface import G_M_S2, Column, ImuSample
+from estimator.params.matrixpilot import CLASSIC as CLASSIC
+from estimator.params.matrixpilot import UDB4 as UDB4
+from estimator.params.matrixpilot import UDB5 as UDB5
+from estimator.params.matrixpilot import MatrixPilotParams as MatrixPilotParams
 from estimator.rotation import NEAR, level, propagate, renormalise
 
 BOOST_RAD_S, MOST_BOOST = math.radians(50.0), 10.0  # spin beyond which the gains rise, and how far
@@ -92,14 +81,7 @@ MATRIX_COUNT = 1.0 / 8192.0  # 2.14 halved and doubled
 SPEED_COUNT_M_S = 0.01
 COURSE_COUNT_RAD = 2.0 * math.pi / 256.0
 
-
-_PARAMS = tuple(
-    Column(f.name, (), "see MatrixPilotParams", integer=isinstance(f.default, bool))
-    for f in fields(MatrixPilotParams)
-    if f.name not in ("gyro_range_rad_s", "force_range_m_s2")  # these two are columns of SCREEN
-)
 _STATE = (
-    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
     Column("omega_p_b", (3,), "proportional rate correction"),
     Column("omega_i_b", (3,), "integral rate correction; minus the offset still found"),
     Column("gyro_gain", (3,), "true rate over corrected reading, near one"),
@@ -121,7 +103,7 @@ _STATE = (
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
 )
-STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + _PARAMS + _STATE)
+STATE_DTYPE = state_dtype(MatrixPilotParams, *_STATE)
 
 
 @kernel
@@ -366,20 +348,8 @@ def feed_back(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def step(rows, k, state):  # type: ignore[no-untyped-def]
-    """One pass of the algorithm over row `k`.
-
-    Parameters
-    ----------
-    rows : shape (N,), MEASURED_DTYPE    not written
-    k : int                              the tick
-    state : shape (1,), STATE_DTYPE      read and written
-
-    Returns
-    -------
-    int    the `Health` of this tick's estimate
-    """
+    """One pass of the algorithm over row `k`; returns the `Health`."""
     row, s = rows[k], state[0]
-    before = s.rejected
     good = screen(row, s)
     if good:
         for i in range(3):
@@ -399,49 +369,22 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             s.roll_pitch_b[0] = s.roll_pitch_b[1] = s.roll_pitch_b[2] = 0.0
         take_report(row, s)
         feed_back(s)
-    if s.rejected != before:
-        return 2  # Health.POOR
-    if not s.locked:
-        return 0  # Health.STARTING
-    return 1 if s.fix_age_s <= FIX_LIFE_S else 2  # Health.GOOD
+    return health_of(s, s.locked, s.fix_age_s <= FIX_LIFE_S)
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
-        write_wind(state[0], estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class MatrixPilot(Compiled):
-    """MatrixPilot's present form of Premerlani and Bizard: turns need no GPS; see the module.
+class MatrixPilot(Compiled[MatrixPilotParams]):
+    """MatrixPilot's present form of Premerlani and Bizard: turns need no GPS; see the module."""
 
-    Parameters
-    ----------
-    params : gains and options; the defaults are those of its UDB4 board
-    """
+    heading_reference = "nose"
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = UDB4
 
-    heading_reference: HeadingReference = "nose"
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
-
-    def __init__(self, params: MatrixPilotParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or MatrixPilotParams()
-        self.reset()
-
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
-
-        Without a sample, or where it is not of something at rest: offset zero, level, as the firmware starts.
-        """
-        s = self._state[0]
-        self._state.fill(0)
-        for f in fields(self.params):
-            s[f.name] = getattr(self.params, f.name)
-        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
-        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
         s["gyro_gain"] = 1.0
         s["fix_age_s"] = math.inf

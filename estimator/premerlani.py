@@ -55,15 +55,12 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 """
 
 import math
-from dataclasses import dataclass, fields
-from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, Compiled, write_estimate, write_wind
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.gps_lag import (
     LAG,
-    LONGEST_LATENCY_S,
     corrected_nose,
     filter_nose,
     recall_nose,
@@ -72,21 +69,12 @@ from estimator.blocks.gps_lag import (
 )
 from estimator.blocks.kernels import clip
 from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    FORCE_RANGE_M_S2,
-    GPS,
-    GYRO_RANGE_RAD_S,
-    SCREEN,
-    airspeed_came,
-    attitude_at_rest,
-    offset_at_rest,
-    refuse,
-    screen,
-)
+from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
-from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
+from estimator.params.premerlani import LEAST_CLIP_M_S2
+from estimator.params.premerlani import PremerlaniParams as PremerlaniParams
 from estimator.rotation import integrate
 
 FIX_LIFE_S = 2.0  # an older fix corrects nothing any more
@@ -94,98 +82,10 @@ AIR_LIFE_S = 1.0  # nor does an older airspeed
 LOCK_TAN, LOCK_S = math.tan(math.radians(15.0)), 1.0  # yaw is locked once it was this close for this long
 TURN_RAD_S, TURN_S = 0.3, 3.0  # slowest turn that tells a speed, and how slowly it is believed
 SHORTEST_NOSE = 0.3  # a shorter filtered nose (a loop, a spin) restores no speed
-LEAST_CLIP_M_S2 = 1.5 * G_M_S2  # no accelerometer that flies ends below
 CLIPPED = 0.99  # of the full scale: the largest count of 8 bits is 0.992 of it
 
 
-@dataclass(frozen=True, slots=True)
-class PremerlaniParams:
-    """Gains and options; `estimator.gains.recommended_gains` works gains out from a time of recovery.
-
-    The receiver by default is what is assumed where nothing is known, see `estimator.instruments`.
-
-    w_rp, w_y : float          weights of the roll-pitch and the yaw correction, Eqn 28.  Large: errors go quickly,
-                               but accelerations and wind get in
-    w_y_until_lock : float     weight of the yaw correction until yaw is locked, where that is more than `w_y`
-    k_p, k_i : float           gains, 1/s and 1/s^2, Eqn 29.  k_i / k_p is how fast a gyro offset is learnt
-    offset_limit_rad_s : float  largest gyro offset believed after the calibration, per axis
-    integrate_below_rad_s : float   no offset is learnt while turning faster; inf turns it off
-    gps_lag_filter : bool      compare the course with an equally late nose, restore the speed
-    gps_filter_s : float       time constant of the receiver's velocity filter; 0 is none
-    gps_latency_s : float      from the moment a fix is true to its arrival, at most 12.5
-    rotate_history : bool      take the receiver's lag out of the yaw loop
-    launch_gate : float        no roll-pitch correction while ``| |g_ref| / g - 1 |`` exceeds it; inf turns it off
-    force_full_scale_m_s2 : float   largest specific force that the accelerometer can read; inf where nobody knows
-    clip_m_s2 : float          an accelerometer axis that reads so much is clipped.  Low: sound readings are left out;
-                               high: clipped ones steer.  inf: 1 % below the full scale
-    find_clip : bool           take the largest reading of an axis for its full scale once it comes a second time
-    use_airspeed : bool        use the airspeed of a sensor in Eqn 25 while there is one
-    turn_speed : bool          learn the speed of Eqn 25 in level turns; good in wind
-    learn_wind : bool          learn the wind in turns, for the reference of Eqn 22 and the speed of Eqn 25; the
-                               heading then converges to the nose.  Needs `rotate_history`
-    min_speed_m_s : float      slowest speed at which a course means anything
-    gyro_range_rad_s, force_range_m_s2 : float   samples beyond are rejected
-    """
-
-    w_rp: float = 0.3
-    w_y: float = 1.2
-    w_y_until_lock: float = 0.0
-    k_p: float = 1.0
-    k_i: float = 0.03
-    offset_limit_rad_s: float = math.radians(6.0)
-    integrate_below_rad_s: float = math.radians(20.0)
-    gps_lag_filter: bool = True
-    gps_filter_s: float = 0.0
-    gps_latency_s: float = 0.3
-    rotate_history: bool = True
-    launch_gate: float = 0.2
-    force_full_scale_m_s2: float = math.inf
-    clip_m_s2: float = math.inf
-    find_clip: bool = False
-    use_airspeed: bool = True
-    turn_speed: bool = False
-    learn_wind: bool = False
-    min_speed_m_s: float = 3.0
-    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
-    force_range_m_s2: float = FORCE_RANGE_M_S2
-
-    def __post_init__(self) -> None:
-        positive = (
-            "offset_limit_rad_s", "integrate_below_rad_s", "launch_gate", "force_full_scale_m_s2", "clip_m_s2",
-            "gyro_range_rad_s", "force_range_m_s2",
-        )  # fmt: skip
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name in positive:
-                if not value > 0.0:
-                    raise ValueError(f"{f.name} is {value}; it must be more than zero")
-            elif not 0.0 <= value < math.inf:
-                raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
-        for name in ("gyro_range_rad_s", "force_range_m_s2"):
-            if getattr(self, name) > 1e4:
-                raise ValueError(f"{name} is {getattr(self, name)}; no sensor has that, 10000 is the most")
-        if self.gps_latency_s > LONGEST_LATENCY_S:
-            raise ValueError(f"gps_latency_s is {self.gps_latency_s} s; {LONGEST_LATENCY_S} s is the most")
-        if self.force_full_scale_m_s2 <= G_M_S2:
-            raise ValueError(
-                f"force_full_scale_m_s2 is {self.force_full_scale_m_s2} m/s^2; gravity is felt, it must be more than "
-                f"{G_M_S2}"
-            )
-        if self.clip_m_s2 < LEAST_CLIP_M_S2:
-            raise ValueError(
-                f"clip_m_s2 is {self.clip_m_s2} m/s^2; gravity is felt, {LEAST_CLIP_M_S2:.1f} is the least"
-            )
-        if self.learn_wind and not self.rotate_history:
-            raise ValueError("learn_wind is on and rotate_history off; wind is learnt from a nose free of corrections")
-
-
-_PARAMS = tuple(
-    Column(f.name, (), "see PremerlaniParams", integer=isinstance(f.default, bool))
-    for f in fields(PremerlaniParams)
-    if f.name not in ("gyro_range_rad_s", "force_range_m_s2", "force_full_scale_m_s2")  # two are columns of SCREEN
-)
 _STATE = (
-    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
     Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
     Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
     Column("omega_total_b", (3,), "corrected rate that is integrated, Eqn 16"),
@@ -206,7 +106,7 @@ _STATE = (
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
 )
-STATE_DTYPE = dtype_of(BELIEF + SCREEN + WIND_FILTER + LAG + _PARAMS + _STATE)
+STATE_DTYPE = state_dtype(PremerlaniParams, *WIND_FILTER, *LAG, *_STATE)
 
 
 @inlined
@@ -343,20 +243,8 @@ def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def step(rows, k, state):  # type: ignore[no-untyped-def]
-    """One pass of the algorithm over row `k`.
-
-    Parameters
-    ----------
-    rows : shape (N,), MEASURED_DTYPE    not written
-    k : int                              the tick
-    state : shape (1,), STATE_DTYPE      read and written
-
-    Returns
-    -------
-    int    the `Health` of this tick's estimate
-    """
+    """One pass of the algorithm over row `k`; returns the `Health`."""
     row, s = rows[k], state[0]
-    before = s.rejected
     good = screen(row, s)
     if good:
         corrected_rate(row, s, good)
@@ -376,55 +264,31 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         correct(s.total_b, s.k_p, s.omega_p_b)
         w = s.omega_b_rad_s
         s.learning = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < s.integrate_below_rad_s * s.integrate_below_rad_s
-    if s.rejected != before:
-        return 2  # Health.POOR
-    if not s.locked:
-        return 0  # Health.STARTING
-    return 1 if s.fix_age_s <= FIX_LIFE_S else 2  # Health.GOOD
+    return health_of(s, s.locked, s.fix_age_s <= FIX_LIFE_S)
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
-        write_wind(state[0], estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class Premerlani(Compiled):
-    """Premerlani and Bizard (2009): gyros, centrifugal term, yaw by the GPS course; see the module.
-
-    Parameters
-    ----------
-    params : gains and options; the defaults suit a model aeroplane with a 1 s, 0.3 s late GPS
-    """
+class Premerlani(Compiled[PremerlaniParams]):
+    """Premerlani and Bizard (2009): gyros, centrifugal term, yaw by the GPS course; see the module."""
 
     heading_reference: HeadingReference = "course"  # "nose" with `learn_wind`
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "airspeed")
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
+    uses = ("gyro", "accelerometer", "gps", "airspeed")
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = PremerlaniParams()
 
     def __init__(self, params: PremerlaniParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or PremerlaniParams()
+        super().__init__(params)
         if self.params.learn_wind:
             self.heading_reference = "nose"
-        self.reset()
 
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
-
-        Without a sample (a start in the air), or where it is not of something at rest: offset zero, level.
-        """
-        s = self._state[0]
-        self._state.fill(0)
-        for name in (*(column.name for column in _PARAMS), "gyro_range_rad_s", "force_range_m_s2"):
-            s[name] = getattr(self.params, name)
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
         if math.isinf(self.params.clip_m_s2):
             s["clip_m_s2"] = CLIPPED * self.params.force_full_scale_m_s2
-        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
-        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
         s["may_clip"] = self.params.find_clip or math.isfinite(s["clip_m_s2"])
         s["fix_age_s"] = s["air_age_s"] = math.inf
         start_history(s)

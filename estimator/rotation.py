@@ -11,7 +11,7 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.blocks.kernels import wrap
+from estimator.blocks.kernels import cross, dot, plus, wrap
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import Array
 
@@ -39,22 +39,6 @@ def propagate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _dot(a, b):  # type: ignore[no-untyped-def]
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def _cross(a, b):  # type: ignore[no-untyped-def]
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inlined
-def _less(a, factor, b):  # type: ignore[no-untyped-def]
-    """``a - factor b``."""
-    return a[0] - factor * b[0], a[1] - factor * b[1], a[2] - factor * b[2]
-
-
-@inlined
 def _set_row(R, i, row, scale):  # type: ignore[no-untyped-def]
     R[i, 0], R[i, 1], R[i, 2] = scale * row[0], scale * row[1], scale * row[2]
 
@@ -62,7 +46,7 @@ def _set_row(R, i, row, scale):  # type: ignore[no-untyped-def]
 @inlined
 def _to_unit(row):  # type: ignore[no-untyped-def]
     """What a row is to be multiplied by for unit length: Eqn 21 near it, the reciprocal of its length elsewhere."""
-    squared = _dot(row, row)
+    squared = dot(row, row)
     return 0.5 * (3.0 - squared) if abs(squared - 1.0) < NEAR else 1.0 / np.sqrt(squared)
 
 
@@ -87,11 +71,11 @@ def renormalise(R_eb):  # type: ignore[no-untyped-def]
             then left as it was, and the caller restarts from an attitude it trusts
     """
     x, y = (R_eb[0, 0], R_eb[0, 1], R_eb[0, 2]), (R_eb[1, 0], R_eb[1, 1], R_eb[1, 2])
-    xx, yy, error = _dot(x, x), _dot(y, y), _dot(x, y)  # Eqn 18
+    xx, yy, error = dot(x, x), dot(y, y), dot(x, y)  # Eqn 18
     if not (abs(xx - 1.0) < NEAR and abs(yy - 1.0) < NEAR and abs(error) < NEAR):
         return _orthogonalise(R_eb, xx, yy, error)
-    x, y = _less(x, 0.5 * error, y), _less(y, 0.5 * error, x)  # Eqn 19
-    z = _cross(x, y)  # Eqn 20
+    x, y = plus(x, -0.5 * error, y), plus(y, -0.5 * error, x)  # Eqn 19
+    z = cross(x, y)  # Eqn 20
     _set_row(R_eb, 0, x, _to_unit(x))  # Eqn 21
     _set_row(R_eb, 1, y, _to_unit(y))
     _set_row(R_eb, 2, z, _to_unit(z))
@@ -107,9 +91,9 @@ def _orthogonalise(R_eb, xx, yy, error):  # type: ignore[no-untyped-def]
     if not 1.0 - error * error / (xx * yy) > HOPELESS:
         return False
     _set_row(R_eb, 0, R_eb[0], 1.0 / np.sqrt(xx))
-    y = _less(R_eb[1], _dot(R_eb[0], R_eb[1]), R_eb[0])
-    _set_row(R_eb, 1, y, 1.0 / np.sqrt(_dot(y, y)))
-    _set_row(R_eb, 2, _cross(R_eb[0], R_eb[1]), 1.0)
+    y = plus(R_eb[1], -dot(R_eb[0], R_eb[1]), R_eb[0])
+    _set_row(R_eb, 1, y, 1.0 / np.sqrt(dot(y, y)))
+    _set_row(R_eb, 2, cross(R_eb[0], R_eb[1]), 1.0)
     return True
 
 
@@ -151,7 +135,7 @@ def integrate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
 
     Never leaves the rotations: a matrix that cannot be saved becomes level, and the answer is then False.
     """
-    angle_squared = dt_s * dt_s * _dot(omega_b_rad_s, omega_b_rad_s)
+    angle_squared = dt_s * dt_s * dot(omega_b_rad_s, omega_b_rad_s)
     if angle_squared > LONGEST_STEP_RAD**2:
         return _integrate_in_parts(R_eb, omega_b_rad_s, dt_s, np.sqrt(angle_squared))
     propagate(R_eb, omega_b_rad_s, dt_s)

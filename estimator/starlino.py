@@ -39,110 +39,27 @@ References
 Starlino, "DCM Tutorial - An Introduction to Orientation Kinematics", 2011, and its comments.
 """
 
-import math
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
-
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, Compiled, write_estimate
-from estimator.blocks.magnetometer import (
-    FIELD,
-    FIELD_RANGE_UT,
-    SHORTEST_HORIZONTAL,
-    Calibration,
-    take_field,
-    turn_to_north,
-    write_calibration,
-)
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    FORCE_RANGE_M_S2,
-    GYRO_RANGE_RAD_S,
-    SCREEN,
-    attitude_at_rest,
-    offset_at_rest,
-    screen,
-    take_rate,
-)
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
+from estimator.blocks.kernels import cross, dot, plus
+from estimator.blocks.magnetometer import FIELD, SHORTEST_HORIZONTAL, take_field, turn_to_north
+from estimator.blocks.screening import FORCE_GOOD, health_of, screen, take_rate
 from estimator.compiler.jit import kernel
-from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, ImuSample
+from estimator.params.starlino import StarlinoParams as StarlinoParams
 
 ZERO = (0.0, 0.0, 0.0)
 SMALL_RAD = 0.1  # "small": larger rotations are applied in parts
 NED_FROM_NWU = np.diag([1.0, -1.0, -1.0])
 
 
-@dataclass(frozen=True, slots=True)
-class StarlinoParams:
-    """Weights and what the sensors are.
-
-    s_g, s_a, s_m : float      weights of gyro, accelerometer and magnetometer, per sample.  The tutorial's author
-                               finds 20 and 1 good in most cases (comment 49) and gives no s_m; an error then goes
-                               with a time constant of (s_g + s_a) / s_a = 21 samples
-    band : float               the accelerometer's weight falls to zero, linearly, while its length is off that of
-                               gravity by this part of it (comment 28: 0.8 to 1.2 g); inf keeps its full weight
-    use_magnetometer : bool    9-DOF; without, or where no sample comes: 6-DOF
-    calibration                of the magnetometer
-    declination_rad : float    of magnetic from true north, positive east
-    gyro_range_rad_s, force_range_m_s2, field_range_ut : float   samples beyond are rejected
-    """
-
-    s_g: float = 20.0
-    s_a: float = 1.0
-    s_m: float = 1.0
-    band: float = 0.2
-    use_magnetometer: bool = True
-    calibration: Calibration = field(default_factory=Calibration)
-    declination_rad: float = 0.0
-    gyro_range_rad_s: float = GYRO_RANGE_RAD_S
-    force_range_m_s2: float = FORCE_RANGE_M_S2
-    field_range_ut: float = FIELD_RANGE_UT
-
-    def __post_init__(self) -> None:
-        for name in ("s_a", "s_m"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, zero or more")
-        for name in ("s_g", "gyro_range_rad_s", "force_range_m_s2", "field_range_ut"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be a finite number, more than zero")
-        if not self.band > 0.0:
-            raise ValueError(f"band is {self.band}; it must be more than zero")
-        if not abs(self.declination_rad) <= math.pi:
-            raise ValueError(f"declination_rad is {self.declination_rad} rad; it must be -pi to pi")
-
-
-_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
-_OF_PARAMS = ("s_g", "s_a", "s_m", "band", "use_magnetometer")
-STATE_DTYPE = dtype_of(
-    (
-        *BELIEF,
-        *SCREEN,
-        *FIELD,
-        *(Column(name, (), "see StarlinoParams", integer=name == "use_magnetometer") for name in _OF_PARAMS),
-        Column("declination_rad", (), "of magnetic from true north, positive east"),
-        Column("aligned", (), "1 once a field has set the heading", integer=True),
-        Column("dcm", (3, 3), "rows I, J, K: north, west and zenith, seen from the body"),
-    )
+STATE_DTYPE = state_dtype(
+    StarlinoParams,
+    *FIELD,
+    Column("aligned", (), "1 once a field has set the heading", integer=True),
+    Column("dcm", (3, 3), "rows I, J, K: north, west and zenith, seen from the body"),
 )
-
-
-@kernel
-def dot(a, b):  # type: ignore[no-untyped-def]
-    """Of two tuples of three."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def cross(a, b):  # type: ignore[no-untyped-def]
-    """Of two tuples of three, a tuple: nothing is allocated."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
-def plus(a, factor, b):  # type: ignore[no-untyped-def]
-    """``a + factor b``."""
-    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @kernel
@@ -248,7 +165,6 @@ def align(s):  # type: ignore[no-untyped-def]
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One sample; returns the `Health`."""
     row, s = rows[k], state[0]
-    before = s.rejected
     good = screen(row, s)
     if good:
         take_rate(row, s, good)
@@ -257,40 +173,26 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             align(s)
         turn(s.dcm, displacement(row, s, good, field_came))
         to_north_east_down(s)
-    return 1 if s.rejected == before else 2  # Health.GOOD, Health.POOR
+    return health_of(s, True, True)
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class Starlino(Compiled):
-    """Starlino's weighted mean of small rotations, in both its forms; see the module."""
+class Starlino(Compiled[StarlinoParams]):
+    """Starlino's weighted mean of small rotations, in both its forms; see the module.
 
-    heading_reference: HeadingReference = "nose"
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "magnetometer")
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
+    The first field sets the heading.  Started in the air it begins with the tutorial's unit matrix, which corrects
+    itself (comment 112).
+    """
 
-    def __init__(self, params: StarlinoParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or StarlinoParams()
-        self.reset()
+    heading_reference = "nose"
+    uses = ("gyro", "accelerometer", "magnetometer")
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = StarlinoParams()
 
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: tilt and gyro offset from the mean sample of something at rest; the first field sets the heading.
-
-        Without a sample, the tutorial's unit matrix, which corrects itself (comment 112).
-        """
-        s = self._state[0]
-        self._state.fill(0)
-        for name in (*_OF_PARAMS, *_RANGES):
-            s[name] = getattr(self.params, name)
-        write_calibration(self._state, self.params.calibration)
-        s["declination_rad"] = self.params.declination_rad
-        s["R_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
         s["dcm"] = NED_FROM_NWU @ s["R_eb"]
-        s["gyro_bias_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)

@@ -1,7 +1,8 @@
 """ArduPilot's DCM estimator."""
 
-from estimator.ap_dcm.ap_dcm import STATE_DTYPE, ApDcm, ApDcm2013, spin_gain
-from estimator.ap_dcm.params import JULY_2013, ApDcmParams, Quirk
+from estimator.ap_dcm.ap_dcm import STATE_DTYPE, ApDcm, ApDcm2013
+from estimator.ap_dcm.yaw import spin_gain
+from estimator.params.ap_dcm import JULY_2013, ApDcmParams, Quirk
 
 __all__ = [
     "JULY_2013",

@@ -30,58 +30,29 @@ W. Premerlani, "Roll-pitch gyro drift compensation", 2011, Eqns 3-5.   W. Premer
 """
 
 import math
-from dataclasses import fields
-from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.ap_dcm.params import JULY_2013, MOST_FIXES, ApDcmParams, Quirk
 from estimator.ap_dcm.wind import AIR_LIFE_S, learn_wind
-from estimator.blocks.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
-from estimator.blocks.kernels import clip, wrap
-from estimator.blocks.magnetometer import FIELD, take_field, write_calibration
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    GPS,
-    SCREEN,
-    airspeed_came,
-    attitude_at_rest,
-    offset_at_rest,
-    refuse,
-    screen,
-    take_rate,
-)
+from estimator.ap_dcm.yaw import FIX_LIFE_S, MIN_SPEED_M_S, SPIN_LIMIT_RAD_S, correct_yaw, spin_gain
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
+from estimator.blocks.kernels import clip
+from estimator.blocks.magnetometer import FIELD, take_field
+from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen, take_rate
 from estimator.compiler.jit import kernel
-from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
+from estimator.params.ap_dcm import AP_DCM_2013, MOST_FIXES, ApDcmParams, Quirk
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate, renormalise_exactly
 
 LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost
-SPIN_LIMIT_RAD_S = math.radians(20.0)  # no offset is learnt while turning faster
 LEARN_S = 5.0 + 1e-5  # the integral moves once in so much slow rotation: 25 fixes of 0.2 s in float32 just miss it
-YAW_LEARN_S = 2.0  # a yaw reference older than this teaches no offset
 NO_GPS_S = 0.2 - 1e-5  # interval of correction without GPS: 20 samples of 10 ms just reach it
-YAW_DECAY = 0.97  # of the proportional yaw term, in each sample without a reference
-YAW_FADE_HZ = -50.0 * math.log(YAW_DECAY)  # the same at any sample rate, as it was at 50 Hz
-MIN_SPEED_M_S = 3.0  # slowest ground speed with a course
-LOST_S, LOST_M_S, LOST_RAD = 20.0, 9.0, 1.047  # heading is set to the course after so long, or if fast and so far off
-COS_OFF_COURSE, OFF_COURSE_S = math.cos(math.radians(45.0)), 2.0  # a compass so far off for so long is not used
 LAUNCH_M_S2 = 7.0  # forward specific force of a throw
 CLIP_G = 0.5
-FIX_LIFE_S, FIELD_LIFE_S = 2.0, 0.5  # an older sample is none
 
-_RANGES = ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut")  # columns of SCREEN and FIELD
-_SETTINGS = tuple(f for f in fields(ApDcmParams) if f.name not in ("quirks", "use_magnetometer", "calibration"))
-_PARAMS = (
-    *(
-        Column(f.name, (), "see ApDcmParams", integer=isinstance(f.default, int))
-        for f in _SETTINGS
-        if f.name not in _RANGES
-    ),
-    Column("use_magnetometer", (), "1 where its samples are taken", integer=True),
-    *(Column(quirk.value, (), "see Quirk", integer=True) for quirk in Quirk),
-)
 _STATE = (
-    Column("calibrated_offset_b_rad_s", (3,), "gyro offset measured at power-up"),
+    *(Column(quirk.value, (), "see Quirk", integer=True) for quirk in Quirk),
+    Column("use_magnetometer", (), "1 where its samples are taken", integer=True),
     Column("omega_p_b", (3,), "proportional roll-pitch correction, held between two of them, Eqn 3.11"),
     Column("omega_yaw_p", (), "proportional yaw correction, about body z, Eqn 3.4"),
     Column("omega_i_b", (3,), "integral correction; minus the offset still found"),
@@ -122,7 +93,7 @@ _STATE = (
     Column("v_wind_e_m_s", (3,), "velocity at the last wind estimate"),
     Column("wind_s", (), "when that was; before any, long ago"),
 )
-STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + FIELD + _PARAMS + _STATE)
+STATE_DTYPE = state_dtype(ApDcmParams, *FIELD, *_STATE)
 
 
 @kernel
@@ -189,92 +160,6 @@ def _copy(source, target):  # type: ignore[no-untyped-def]
     for i in range(3):
         for j in range(3):
             target[i, j] = source[i, j]
-
-
-@kernel
-def _yaw(R_eb):  # type: ignore[no-untyped-def]
-    return np.arctan2(R_eb[1, 0], R_eb[0, 0])
-
-
-@kernel
-def set_heading(s, heading_rad):  # type: ignore[no-untyped-def]
-    """Set the heading: the matrix of the Euler angles' roll and pitch, and of `heading_rad`."""
-    angle = heading_rad - _yaw(s.R_euler_eb)
-    c, z = np.cos(angle), np.sin(angle)
-    for j in range(3):
-        north, east = s.R_euler_eb[0, j], s.R_euler_eb[1, j]
-        s.R_eb[0, j], s.R_eb[1, j], s.R_eb[2, j] = c * north - z * east, z * north + c * east, s.R_euler_eb[2, j]
-    s.omega_yaw_p = 0.0
-    s.yaw_found = 1
-
-
-@kernel
-def judge_compass(s):  # type: ignore[no-untyped-def]
-    """Set ``s.compass``: not if far off a course that wind alone cannot explain."""
-    off = False
-    if s.fly_forward and s.fix_age_s <= FIX_LIFE_S and s.speed_m_s >= MIN_SPEED_M_S:
-        w, x, y = s.wind_e_m_s, s.R_euler_eb[0, 0], s.R_euler_eb[1, 0]
-        calm = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < (0.8 * s.speed_m_s) ** 2
-        off = calm and x * s.course[0] + y * s.course[1] < COS_OFF_COURSE * np.sqrt(x * x + y * y)
-    s.off_course_s = s.off_course_s + s.dt_s if off else 0.0
-    s.compass = s.field_age_s <= FIELD_LIFE_S and s.off_course_s <= (0.0 if s.hasty_compass else OFF_COURSE_S)
-
-
-@kernel
-def compass_error(s):  # type: ignore[no-untyped-def]
-    """Earth-frame yaw error of the magnetometer (Eqns 3.1 and 3.2); sets the heading the first time."""
-    m = s.field_b_ut
-    north = s.R_eb[0, 0] * m[0] + s.R_eb[0, 1] * m[1] + s.R_eb[0, 2] * m[2]  # Eqn 3.1
-    east = s.R_eb[1, 0] * m[0] + s.R_eb[1, 1] * m[1] + s.R_eb[1, 2] * m[2]
-    length = np.sqrt(north * north + east * east)
-    if length < 1e-9:  # it points straight down: no direction
-        return 0.0
-    if not s.yaw_found:
-        set_heading(s, _yaw(s.R_eb) + s.declination_rad - np.arctan2(east, north))
-        return 0.0
-    return (north * np.sin(s.declination_rad) - east * np.cos(s.declination_rad)) / length  # Eqn 3.2
-
-
-@kernel
-def course_error(s):  # type: ignore[no-untyped-def]
-    """Earth-frame yaw error against the course; sets the heading to it where yaw is lost."""
-    apart = s.course_rad - _yaw(s.R_euler_eb)
-    far = abs(apart if s.unwrapped_course else wrap(apart)) >= LOST_RAD
-    known_s = s.course_yaw_s if s.compass_is_no_yaw else max(s.course_yaw_s, s.compass_yaw_s)
-    if not s.yaw_found or s.clock_s - known_s > LOST_S or (s.speed_m_s >= LOST_M_S and far):
-        set_heading(s, s.course_rad)
-        return 0.0
-    return np.sin(apart)
-
-
-@kernel
-def correct_yaw(s):  # type: ignore[no-untyped-def]
-    """Yaw correction by compass or course (Eqns 3.3-3.5): body z alone is corrected."""
-    judge_compass(s)
-    if s.compass and s.new_field:
-        now_s = s.clock_s - s.field_age_s
-        since_s = now_s - s.compass_yaw_s
-        error = compass_error(s)
-        s.compass_yaw_s, s.new_field = now_s, 0
-    elif not s.compass and s.fly_forward and s.new_course and s.speed_m_s >= MIN_SPEED_M_S:
-        now_s = s.clock_s - s.fix_age_s
-        since_s = now_s - s.course_yaw_s
-        error = course_error(s)
-        s.course_yaw_s, s.new_course = now_s, 0
-    else:
-        s.omega_yaw_p *= YAW_DECAY if s.decay_per_sample else np.exp(-YAW_FADE_HZ * s.dt_s)
-        return
-    error *= s.R_eb[2, 2]  # Eqn 3.3
-    s.omega_yaw_p = s.kp_yaw * spin_gain(s) * error  # Eqn 3.4
-    if since_s < YAW_LEARN_S and s.spin_rad_s < SPIN_LIMIT_RAD_S:
-        s.omega_sum_b[2] += s.ki_yaw * error * since_s  # Eqn 3.5
-
-
-@kernel
-def spin_gain(s):  # type: ignore[no-untyped-def]
-    """One up to 50 deg/s, ten from 500 deg/s on ("Fast rotations")."""
-    fast = np.degrees(50.0) if s.stuck_p_gain else np.radians(50.0)
-    return clip(s.spin_rad_s / fast, 1.0, 10.0)
 
 
 @kernel
@@ -416,7 +301,6 @@ def forget_interval(s):  # type: ignore[no-untyped-def]
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One inertial sample, in the original's order; returns the `Health`."""
     row, s = rows[k], state[0]
-    before = s.rejected
     good = screen(row, s)
     if good:
         take_arrivals(row, s)
@@ -428,59 +312,33 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             sum_force(row, s, good)  # before a heading is set: the interval was felt in the frame of until now
             correct_yaw(s)
             correct_by_force(row, s, good)
-    if s.rejected != before:
-        return 2  # Health.POOR
-    if not s.yaw_found:
-        return 0  # Health.STARTING
-    return 1 if s.fix_age_s <= FIX_LIFE_S or s.compass else 2  # Health.GOOD
+    return health_of(s, s.yaw_found, s.fix_age_s <= FIX_LIFE_S or s.compass)
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
-        write_wind(state[0], estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class ApDcm(Compiled):
-    """ArduPilot's DCM of July 2013, mended unless the parameters say otherwise.
-
-    Parameters
-    ----------
-    params : settings and quirks
-    """
+class ApDcm(Compiled[ApDcmParams]):
+    """ArduPilot's DCM of July 2013, with its quirks corrected unless the parameters restore them; see the module."""
 
     heading_reference: HeadingReference = "course"  # "nose" where a magnetometer is known to be fitted
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
-    _default: ClassVar[ApDcmParams] = ApDcmParams()
+    uses = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = ApDcmParams()
 
     def __init__(self, params: ApDcmParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or self._default
+        super().__init__(params)
         if self.params.use_magnetometer:
             self.heading_reference = "nose"
-        self.reset()
 
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held); heading north.
-
-        Without a sample, or where it is not of something at rest: offset zero, level, as the original began.
-        """
-        s = self._state[0]
-        self._state.fill(0)
-        for f in _SETTINGS:
-            s[f.name] = getattr(self.params, f.name)
-        write_calibration(self._state, self.params.calibration)
-        use = self.params.use_magnetometer
-        s["use_magnetometer"] = use is None or bool(use)
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:  # noqa: ARG002
+        s["use_magnetometer"] = self.params.use_magnetometer in (None, True)
         for quirk in self.params.quirks:
             s[Quirk(quirk).value] = 1
-        s["R_eb"] = s["R_euler_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
-        s["calibrated_offset_b_rad_s"] = 0.0 if on_ground is None else offset_at_rest(on_ground)
-        s["gyro_bias_b_rad_s"] = s["calibrated_offset_b_rad_s"]
+        s["R_euler_eb"] = s["R_eb"]
         s["fix_age_s"] = s["field_age_s"] = s["air_age_s"] = math.inf
         s["wind_s"] = s["compass_yaw_s"] = s["course_yaw_s"] = -math.inf
 
@@ -488,4 +346,4 @@ class ApDcm(Compiled):
 class ApDcm2013(ApDcm):
     """The original of 12 July 2013: `ApDcm` with all quirks."""
 
-    _default = ApDcmParams(quirks=JULY_2013)
+    _default = AP_DCM_2013

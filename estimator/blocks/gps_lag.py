@@ -22,7 +22,6 @@ from estimator.compiler.jit import inlined, kernel
 from estimator.interface import Column
 
 HISTORY, SPACING_S = 640, 0.0199  # remembered noses and their least distance in time: 12.7 s at any sample rate
-LONGEST_LATENCY_S = 12.5
 LARGE_RAD = 0.05  # a larger correction of a single step is turned exactly: the small one is good to its cube / 3
 
 LAG = (

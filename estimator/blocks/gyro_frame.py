@@ -19,11 +19,10 @@ import numpy as np
 
 from estimator.blocks.screening import COAST_S, FORCE_GOOD, LONGEST_GAP_S
 from estimator.compiler.jit import inlined, kernel
-from estimator.interface import G_M_S2, Array, Column
+from estimator.interface import G_M_S2, Column
 from estimator.rotation import integrate, level, renormalise
 
 HISTORY, SPACING_S = 640, 0.0199  # remembered instants and their least distance: 12.7 s at any sample rate
-LONGEST_LATENCY_S = 12.5
 DUE_S = 0.05  # corrections, slow as they are, are applied in parts no shorter than this
 FLUSHED = 3.0  # after so many time constants the filter has forgotten
 
@@ -54,13 +53,13 @@ GYRO_FRAME = (
 )
 
 
-def start_gyro_frame(s: np.void, R_eb: Array) -> None:
-    """Set the columns of `GYRO_FRAME` in the zeroed record `s`: at rest in the attitude `R_eb` since long ago."""
-    s["R_eb"] = s["R_gb"] = R_eb
+def start_gyro_frame(s: np.void) -> None:
+    """Set the columns of `GYRO_FRAME` in the zeroed record `s`: at rest in its attitude since long ago."""
+    s["R_gb"] = s["R_eb"]
     s["R_eg"] = s["R_og"] = np.eye(3)
     s["crab"][0] = 1.0
     s["late_g"][2] = -G_M_S2 * s["gps_filter_s"]  # a filtered integral of gravity is late by the time constant
-    s["late_g"][3:] = R_eb[:, 0]
+    s["late_g"][3:] = s["R_eb"][:, 0]
     s["history"] = s["at_fix_g"] = s["late_g"]
     s["blind_until_s"] = -math.inf
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.compiler.jit import inlined
-from estimator.interface import G_M_S2, Array, Column, ImuSample
+from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Array, Column, ImuSample
 from estimator.rotation import from_euler
 
 SHORTEST_INTERVAL_S = 1e-6  # no gyro samples faster, and what is divided by an interval stays finite
@@ -19,8 +19,6 @@ CLOCK_BACK_S = 1.0  # a time this far back is no late sample but a clock that wa
 COAST_S = 0.25  # how long the last good rate stands in for a broken gyro
 # Mean samples further off are not of something at rest; parts are sold with offsets of up to +-40 deg/s.
 AT_REST_RAD_S, AT_REST_G = math.radians(45.0), 0.2
-GYRO_RANGE_RAD_S = math.radians(2100.0)  # readings beyond are no measurement: just more than the largest parts have
-FORCE_RANGE_M_S2 = 17.0 * G_M_S2
 AIRSPEED_RANGE_M_S = 1000.0
 
 PASSED, GYRO_GOOD, FORCE_GOOD = 1, 2, 4  # bits of what `screen` answers: time passed, and what to believe
@@ -131,6 +129,16 @@ def airspeed_came(row, s):  # type: ignore[no-untyped-def]
     if s.air_age_s < np.inf or not np.isnan(row.airspeed_m_s):
         refuse(s, AIR)
     return False
+
+
+@inlined
+def health_of(s, found, referenced):  # type: ignore[no-untyped-def]
+    """The `Health` of this tick: STARTING until the heading is `found`, GOOD while a fresh reference corrects it."""
+    if s.spoilt:
+        return POOR
+    if not found:
+        return STARTING
+    return GOOD if referenced else POOR
 
 
 @inlined

@@ -19,7 +19,6 @@ References
 W. Premerlani, "IMU wind estimation (theory)", 2009 (the two-fix form).
 """
 
-from estimator.blocks.compiled import WIND
 from estimator.compiler.jit import kernel
 from estimator.interface import Column
 
@@ -34,7 +33,6 @@ FORGET_S = 4.0  # how long surprises must go on until the airspeed is learnt ane
 SHORTEST_NOSE = 0.5  # a filtered nose shorter than this was in a loop or a spin
 
 WIND_FILTER = (
-    *WIND,
     Column("air_m_s", (2,), "c: airspeed, turned from the heading of the gyros' nose to the true one"),
     Column("wind_variance", (), "of the wind, per axis, (m/s)^2; 0 before the first fix"),
     Column("air_variance", (), "of c, per axis, (m/s)^2"),
@@ -48,7 +46,7 @@ def learn_wind(s, nose_north, nose_east, v_north_m_s, v_east_m_s, dt_s):  # type
 
     Parameters
     ----------
-    s : record with the columns of WIND_FILTER    read and written
+    s : record with the columns of BELIEF and WIND_FILTER    read and written
     nose_north, nose_east     horizontal nose, filtered and late like the fix, free of yaw corrections; a short one
                               (a loop, a spin) teaches nothing
     v_north_m_s, v_east_m_s   reported ground velocity

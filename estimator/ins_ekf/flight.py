@@ -366,7 +366,7 @@ def keep_sane(s):  # type: ignore[no-untyped-def]
         level(s.R_filter_eb)
     if not (whole and total < 1e9):
         for i in range(3):
-            s.gyro_bias_b_rad_s[i] = s.calibrated_bias_b_rad_s[i]
+            s.gyro_bias_b_rad_s[i] = s.calibrated_offset_b_rad_s[i]
             s.gyro_gain[i] = s.force_bias_b_m_s2[i] = 0.0
         start(s, RESTART_TILT_RAD, s.wind_sigma_m_s)
         s.rejected += 1

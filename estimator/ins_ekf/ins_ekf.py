@@ -51,24 +51,12 @@ standard sensors", ICUAS 2015.
 """
 
 import math
-from dataclasses import fields
-from typing import Any, ClassVar
 
 import numpy as np
 
-from estimator.blocks.compiled import BELIEF, WIND, Compiled, write_estimate, write_wind
-from estimator.blocks.magnetometer import FIELD, take_field, write_calibration
-from estimator.blocks.screening import (
-    FORCE_GOOD,
-    GPS,
-    GYRO_GOOD,
-    SCREEN,
-    airspeed_came,
-    attitude_at_rest,
-    offset_at_rest,
-    refuse,
-    screen,
-)
+from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
+from estimator.blocks.magnetometer import FIELD, take_field
+from estimator.blocks.screening import FORCE_GOOD, GPS, GYRO_GOOD, airspeed_came, refuse, screen
 from estimator.compiler.jit import kernel
 from estimator.ins_ekf.flight import (
     CUT_FORCE,
@@ -97,8 +85,8 @@ from estimator.ins_ekf.kernels import (
     true_rate,
     turn_in_body,
 )
-from estimator.ins_ekf.params import FLOORS, InsEkfParams
-from estimator.interface import G_M_S2, Array, Column, HeadingReference, ImuSample, Instrument, dtype_of
+from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Array, Column, ImuSample
+from estimator.params.ins_ekf import FLOORS, InsEkfParams
 from estimator.rotation import level, renormalise
 
 LONGEST_STAMPED_S = 2.0  # a stamp further back is of another clock
@@ -108,16 +96,9 @@ COAST_S = 0.25  # how long the last rate stands in for a broken gyro
 WIND_KNOWN_M_S = 1.5  # sigma, both axes together, of a wind worth telling
 GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigmas of a good attitude
 
-
-_PARAMS = tuple(
-    Column(f.name, (), "see InsEkfParams", integer=isinstance(f.default, bool))
-    for f in fields(InsEkfParams)
-    if f.name not in ("gyro_range_rad_s", "force_range_m_s2", "field_range_ut", "calibration")  # of SCREEN and FIELD
-)
 _FILTER = (
     Column("R_filter_eb", (3, 3), "attitude at the filter's time"),
     Column("v_e_m_s", (3,), "velocity over the ground, at the filter's time"),
-    Column("calibrated_bias_b_rad_s", (3,), "gyro bias measured at power-up"),
     Column("gyro_gain", (3,), "what the gyro reads too much, per unit of rate"),
     Column("force_bias_b_m_s2", (3,), "what the accelerometer reads too much"),
     Column("lagged_v_e_m_s", (3,), "velocity inside the receiver, behind its filter"),
@@ -164,7 +145,7 @@ _AROUND = (
     Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
     Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
 )
-STATE_DTYPE = dtype_of(BELIEF + WIND + SCREEN + FIELD + _PARAMS + _FILTER + _AROUND)
+STATE_DTYPE = state_dtype(InsEkfParams, *FIELD, *_FILTER, *_AROUND)
 
 
 # What waits
@@ -263,16 +244,7 @@ def reach_present(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def step(rows, k, state):  # type: ignore[no-untyped-def]
-    """One sample: see the module.
-
-    Parameters
-    ----------
-    rows : shape (N,), MEASURED   k : row of this tick   state : shape (1,), STATE_DTYPE, updated
-
-    Returns
-    -------
-    int    the `Health` of this tick's estimate
-    """
+    """One sample: see the module; returns the `Health`."""
     row, s = rows[k], state[0]
     before = s.rejected
     good = screen(row, s)
@@ -297,60 +269,42 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
 def health(s, rejecting):  # type: ignore[no-untyped-def]
     """What the filter says of itself."""
     if not s.aligned:
-        return 0  # Health.STARTING
+        return STARTING
     tilt = s.P[TILT, TILT] + s.P[TILT + 1, TILT + 1]
     if rejecting or s.fix_age_s > FIX_LIFE_S or not tilt < GOOD_TILT_RAD**2:
-        return 2  # Health.POOR
-    return 1 if s.P[TILT + 2, TILT + 2] < GOOD_HEADING_RAD**2 else 0  # Health.GOOD
+        return POOR
+    return GOOD if s.P[TILT + 2, TILT + 2] < GOOD_HEADING_RAD**2 else STARTING
 
 
 @kernel
 def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
     for k in range(rows.shape[0]):
-        health = step(rows, k, state)
-        write_estimate(state[0], health, estimates[k])
-        write_wind(state[0], estimates[k])
+        write_estimate(state[0], step(rows, k, state), estimates[k])
 
 
-class InsEkf(Compiled):
+class InsEkf(Compiled[InsEkfParams]):
     """An inertial navigation filter that models the sensors and learns the wind; see the module.
 
-    Parameters
-    ----------
-    params : what it believes of its sensors; the defaults are what is assumed where nothing is known
+    Started at power-up it assumes rest; started in the air it takes velocity and heading from the first fix.
     """
 
-    heading_reference: HeadingReference = "nose"
-    uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
-    _step: ClassVar[Any] = staticmethod(step)
-    _replay: ClassVar[Any] = staticmethod(_replay)
+    heading_reference = "nose"
+    uses = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
+    _default = InsEkfParams()
 
-    def __init__(self, params: InsEkfParams | None = None) -> None:
-        super().__init__(STATE_DTYPE)
-        self.params = params or InsEkfParams()
-        self.reset()
-
-    def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample `on_ground` (standing or held), at rest, heading north.
-
-        Without a sample: a start in the air, level; velocity and heading from the first fix.
-        """
-        s = self._state[0]
-        self._state.fill(0)
-        for f in fields(self.params):
-            if f.name != "calibration":
-                s[f.name] = max(getattr(self.params, f.name), FLOORS.get(f.name, -math.inf))
-        write_calibration(self._state, self.params.calibration)
+    def _begin(self, s: np.void, on_ground: ImuSample | None) -> None:
+        for name, least in FLOORS.items():
+            s[name] = max(s[name], least)
         s["air_age_s"] = math.inf
         s["delay_s"] = s["latency_s"] = self.params.gps_latency_s
         s["longest_latency_s"] = self.params.longest_latency_s
         s["lift_e_m_s2"] = -G_M_S2
-        s["R_eb"] = s["R_filter_eb"] = np.eye(3) if on_ground is None else attitude_at_rest(on_ground)
+        s["R_filter_eb"] = s["R_eb"]
         if on_ground is None:
             start_in_air(self._state)
-            return
-        s["gyro_bias_b_rad_s"] = s["calibrated_bias_b_rad_s"] = offset_at_rest(on_ground)
-        start_at_rest(self._state, np.array(on_ground.force_b_m_s2, np.float64))
+        else:
+            start_at_rest(self._state, np.array(on_ground.force_b_m_s2, np.float64))
 
     @property
     def learnt(self) -> dict[str, float]:

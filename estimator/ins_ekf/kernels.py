@@ -268,7 +268,7 @@ def correct_state(s, innovation):  # type: ignore[no-untyped-def]
     for i in range(3):
         s.v_e_m_s[i] += k[VEL + i] * innovation
         s.lagged_v_e_m_s[i] += k[LAG + i] * innovation
-        calibrated = s.calibrated_bias_b_rad_s[i]
+        calibrated = s.calibrated_offset_b_rad_s[i]
         change = s.gyro_bias_b_rad_s[i] - calibrated + k[BIAS + i] * innovation
         s.gyro_bias_b_rad_s[i] = calibrated + within(change, 2.0 * s.gyro_bias_sigma_rad_s)
         s.gyro_gain[i] = within(s.gyro_gain[i] + k[GAIN + i] * innovation, s.gyro_gain_sigma)

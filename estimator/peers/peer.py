@@ -2,7 +2,6 @@
 
 import importlib
 import math
-from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -10,12 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from estimator.blocks.compiled import BELIEF
 from estimator.blocks.magnetometer import FIELD as FIELD_COLUMNS
-from estimator.blocks.magnetometer import FIELD_RANGE_UT, Calibration, take_field, turn_to_north, write_calibration
+from estimator.blocks.magnetometer import take_field, turn_to_north, write_calibration
 from estimator.blocks.screening import (
     FORCE_GOOD,
-    FORCE_RANGE_M_S2,
     GPS,
-    GYRO_RANGE_RAD_S,
     SCREEN,
     attitude_at_rest,
     offset_at_rest,
@@ -36,6 +33,8 @@ from estimator.interface import (
     Measurements,
     dtype_of,
 )
+from estimator.params.peers import PeerParams
+from estimator.params.shared import RANGES
 from estimator.rotation import heading_rad
 
 # In this order, because numba takes a record for a subtype of every one that begins like it, and says so aloud.
@@ -126,30 +125,6 @@ def _take_quaternion(q, earth, body, declination_rad, state):  # type: ignore[no
 NOTHING_LEARNT = np.zeros(3)
 
 
-@dataclass(frozen=True, slots=True)
-class PeerParams:
-    """What all of them have in common.
-
-    declination_rad : float     of magnetic north from true north, positive to the east; added to a magnetic heading
-    use_magnetometer : bool     use the magnetometer where the package can; False for one that is not calibrated
-    calibration                 of the magnetometer: the packages are given calibrated samples
-    field_range_ut : float      a reading of an axis beyond this is rejected
-    """
-
-    declination_rad: float = 0.0
-    use_magnetometer: bool = True
-    calibration: Calibration = field(default_factory=Calibration)
-    field_range_ut: float = FIELD_RANGE_UT
-
-    def __post_init__(self) -> None:
-        if not abs(self.declination_rad) <= math.pi:
-            raise ValueError(f"declination_rad is {self.declination_rad} rad; it must lie between -pi and pi")
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name not in ("declination_rad", "calibration") and not 0.0 <= value < math.inf:
-                raise ValueError(f"{f.name} is {value}; it must be a finite number, zero or more")
-
-
 class Heard(NamedTuple):
     """What a package is given in one tick, in our units and its own body axes; None where nothing is believed.
 
@@ -201,8 +176,9 @@ class Peer:
         """
         s = self._state[0]
         self._state.fill(0)
-        s["gyro_range_rad_s"], s["force_range_m_s2"] = GYRO_RANGE_RAD_S, FORCE_RANGE_M_S2
-        s["course_age_s"], s["field_range_ut"] = math.inf, self.params.field_range_ut
+        for name in RANGES:
+            s[name] = getattr(self.params, name)
+        s["course_age_s"] = math.inf
         write_calibration(self._state, self.params.calibration)
         self._offset_b_rad_s = np.zeros(3) if on_ground is None else offset_at_rest(on_ground)
         s["gyro_bias_b_rad_s"] = self._offset_b_rad_s

@@ -43,13 +43,13 @@ estimation with bias estimation and magnetic disturbance rejection", Information
 """
 
 import math
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from estimator.interface import G_M_S2, Array, HeadingReference, Instrument
-from estimator.peers.peer import EAST_NORTH_UP, LEFT_UP, NORTH_WEST_UP, Heard, Keeping, Peer, PeerParams, package
+from estimator.params.peers import ImufusionParams, MadgwickParams, MahonyParams, VqfParams
+from estimator.peers.peer import EAST_NORTH_UP, LEFT_UP, NORTH_WEST_UP, Heard, Keeping, Peer, package
 
 NO_FORCE, NO_FIELD = np.zeros(3), np.zeros(3)
 SHORTEST_S = 5e-4  # sample interval that a package is told at least
@@ -81,17 +81,6 @@ class _Ahrs(Keeping):
         raise NotImplementedError
 
 
-@dataclass(frozen=True, slots=True)
-class MadgwickParams(PeerParams):
-    """Gains; the package's defaults.
-
-    gain_imu, gain_marg : float     size of the correction, rad/s, without and with a magnetometer's sample
-    """
-
-    gain_imu: float = 0.033
-    gain_marg: float = 0.041
-
-
 class Madgwick(_Ahrs):
     """Madgwick's gradient descent, from the package ahrs."""
 
@@ -116,17 +105,6 @@ class Madgwick(_Ahrs):
 
     def _keep(self, kept: Array) -> None:
         self._q = kept.copy()
-
-
-@dataclass(frozen=True, slots=True)
-class MahonyParams(PeerParams):
-    """Gains; the package's defaults.
-
-    k_p, k_i : float    proportional gain, 1/s, and integral gain, 1/s^2
-    """
-
-    k_p: float = 1.0
-    k_i: float = 0.3
 
 
 class Mahony(_Ahrs):
@@ -155,17 +133,6 @@ class Mahony(_Ahrs):
 
     def _keep(self, kept: tuple[Array, Array]) -> None:
         self._q, self._filter.b = kept[0].copy(), kept[1].copy()
-
-
-@dataclass(frozen=True, slots=True)
-class VqfParams(PeerParams):
-    """Time constants; the package's defaults.
-
-    tau_acc_s, tau_mag_s : float    how slowly accelerometer and magnetometer are believed, s
-    """
-
-    tau_acc_s: float = 3.0
-    tau_mag_s: float = 9.0
 
 
 class Vqf(Keeping):
@@ -232,23 +199,6 @@ class Vqf(Keeping):
         if state is not None:
             self._make(*self._intervals_s)
             self._filter.state = state
-
-
-@dataclass(frozen=True, slots=True)
-class ImufusionParams(PeerParams):
-    """Settings, as the package's own examples have them.
-
-    gain : float                        pull of accelerometer and heading, rad/s per unit of error
-    gyroscope_range_deg_s : float       beyond it counts as overrange; 0 turns it off
-    acceleration_rejection_deg, magnetic_rejection_deg : float      larger errors are ignored; 0 turns it off
-    rejection_timeout_s : float         ... until they have lasted this long
-    """
-
-    gain: float = 0.5
-    gyroscope_range_deg_s: float = 2000.0
-    acceleration_rejection_deg: float = 10.0
-    magnetic_rejection_deg: float = 10.0
-    rejection_timeout_s: float = 5.0
 
 
 class Imufusion(Peer):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from estimator.blocks.magnetometer import Calibration, hard_iron_from_extremes
+from estimator.blocks.calibration import Calibration, hard_iron_from_extremes
 from estimator.dilshad import heading_of_field
 from estimator.interface import Array
 from estimator.rotation import from_euler, heading_rad

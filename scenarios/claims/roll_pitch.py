@@ -12,10 +12,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from estimator.ap_dcm import ApDcm
-from estimator.ap_dcm.params import ApDcmParams
 from estimator.blocks.compiled import Compiled
 from estimator.gps_velocity import GpsVelocity, GpsVelocityMagnetometer, GpsVelocityParams
 from estimator.interface import Array, AttitudeEstimate, Measurements
+from estimator.params.ap_dcm import ApDcmParams
 from estimator.premerlani import Premerlani, PremerlaniParams
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claims.flights import flights
@@ -80,7 +80,7 @@ def loops(changes: dict[str, Any] | None = None) -> Log:
     return _clean("loops", {"air.wind_m_s": 0.0, **(changes or {})})
 
 
-def tilts_deg(estimator: Compiled, log: Log, settled: int = SETTLED) -> Array:
+def tilts_deg(estimator: Compiled[Any], log: Log, settled: int = SETTLED) -> Array:
     """Tilt errors of `estimator` over `log` once settled."""
     return tilt_deg(estimator.replay(log.measured)["R_eb"], log)[settled:]
 
@@ -226,7 +226,7 @@ def _any_vehicle(_seeds: Sequence[int]) -> Finding:
     }  # fmt: skip
     logs = {name: seen(motion, 80.0) for name, motion in motions.items()}
 
-    def tilts(estimator: Compiled, log: Log) -> Array:
+    def tilts(estimator: Compiled[Any], log: Log) -> Array:
         estimator.reset(felt_at_rest(log.truth["R_eb"][0]))  # type: ignore[attr-defined]
         return tilts_deg(estimator, log)
 

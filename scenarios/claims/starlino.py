@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -163,7 +164,7 @@ def _in_the_hand(seeds: Sequence[int]) -> Finding:
     for seed in seeds:
         log, start = seen(HandHeld(), 600.0, BOARD, seed=seed), mean_at_rest(BOARD, seed)
         nine_axes = StarlinoParams(calibration=calibration(BOARD, seed), declination_rad=DECLINATION_RAD)
-        estimators: tuple[Compiled, ...] = (GyroOnly(), six_axes(), Starlino(nine_axes))
+        estimators: tuple[Compiled[Any], ...] = (GyroOnly(), six_axes(), Starlino(nine_axes))
         for name, estimator in zip(ends, estimators, strict=True):
             estimator.reset(start)  # type: ignore[attr-defined]
             R = estimator.replay(log.measured)["R_eb"]

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimator.ap_dcm import ApDcm, spin_gain
-from estimator.ap_dcm.params import JULY_2013, ApDcmParams, Quirk
 from estimator.blocks.kernels import wrap
 from estimator.interface import Array, Measurements
+from estimator.params.ap_dcm import JULY_2013, ApDcmParams, Quirk
 from estimator.rotation import propagate, renormalise, renormalise_exactly, to_euler
 from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
 from scenarios.harness.claims.flights import flights

@@ -12,7 +12,7 @@ import math
 from dataclasses import asdict
 from typing import Any
 
-from estimator.blocks.magnetometer import Calibration
+from estimator.blocks.calibration import Calibration
 from estimator.instruments import Instruments, Known
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.plugins import Equipped, Maker, equipped, params_of

@@ -1,12 +1,11 @@
-"""Estimators over a recorded log: run, scored against the attitude that the log holds, recorded like a flight.
+"""Estimators over a recorded log: run, scored against the attitude in the log, recorded like a flight.
 
-Each estimator gets all rows in order.  It powers up with the mean inertial sample of the first seconds where the
-aeroplane was at rest in them, else as in the air; against what an original firmware printed for reference vectors
-always as in the air, as that firmware did.
+Each estimator gets all rows in order.  If the aeroplane was at rest in the first seconds, it powers up with the mean
+inertial sample of these; otherwise, and always when compared with the output of firmware, it powers up as in the air.
 
-Judged are the rows with a reference while airborne (GPS ground speed above a limit, see `flying`; all rows of a log
-without GPS, or where the limit is 0), after a time to settle.  Against firmware every row counts: two runs of one
-algorithm agree from the first sample on.
+Judged are rows with a reference while airborne (GPS ground speed above a limit, see `flying`; all rows of a log without
+GPS, or with a limit of 0), after a settling time.  Against firmware every row counts: two runs of one algorithm agree
+from the first sample.
 """
 
 import math
@@ -26,7 +25,7 @@ from estimator.rotation import heading_error_rad, inclination_error_rad, rotatio
 from scenarios.harness.cli import console
 from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
-from scenarios.harness.logs.validity import INTERVALS, LONGEST_S
+from scenarios.harness.logs.validity import INTERVALS, LONGEST_S, latest
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
 from scenarios.harness.plugins import (
     Equipped,
@@ -46,32 +45,26 @@ from sim.outside.blame import Refused, shown
 from sim.outside.wording import printable
 
 CALIBRATION_S = 2.0
-STILL_M_S, STILL_M_S2 = 2.0, 0.7  # faster over the ground, or shaken more than this (sigma), is not at rest
-BLOCK = 5000  # rows between two steps of the bar, where an estimator is called row by row
-_UNKNOWN = (
-    "omega_b_rad_s",
-    "imu_omega_b_rad_s",
-    "imu_force_b_m_s2",
-    "wind_e_m_s",
-    "gyro_bias_b_rad_s",
-    "force_bias_b_m_s2",
-    "alpha_rad",
-    "beta_rad",
-)  # fmt: skip - what no log tells of the truth
+STILL_M_S, STILL_M_S2 = 2.0, 0.7  # at rest: ground speed, and standard deviation of the specific force, at most
+BLOCK = 5000  # rows between updates of the progress bar
+_UNKNOWN = (  # columns of the truth that no log holds
+    "omega_b_rad_s", "imu_omega_b_rad_s", "imu_force_b_m_s2", "wind_e_m_s", "gyro_bias_b_rad_s", "force_bias_b_m_s2",
+    "alpha_rad", "beta_rad",
+)  # fmt: skip
 SCORES = (
     "inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg", "heading_rms_deg",
     "rotation_rms_deg", "rotation_max_deg",
 )  # fmt: skip
-MOST_REFUSED = 100  # kinds of samples that an estimator may count
-SHARE_S, REPEATS = 0.3, 7  # the time is the least of several runs, while they take no longer than this
+MOST_REFUSED = 100  # kinds of rejected samples that an estimator may report
+SHARE_S, REPEATS = 0.3, 7  # the least time of several runs counts, within this total
 
 
 @dataclass(frozen=True, slots=True)
 class Window:
     """Which rows are judged, and how an estimator powers up.
 
-    airborne_m_s : ground speed above which the aeroplane flies      settle_s : left out after it first did
-    calibration_s : at the start, averaged for the power-up if at rest; None is 2 s, or 0 against firmware
+    airborne_m_s : ground speed above which the aeroplane is airborne      settle_s : ignored after it first is
+    calibration_s : averaged at the start for the power-up, if at rest; None means 2 s, or 0 against firmware
     """
 
     airborne_m_s: float = 5.0
@@ -89,10 +82,10 @@ class Window:
 class Replayed:
     """One estimator over a log.
 
-    flown : shape (N,), its estimates        first : the first row that it saw
-    ns_per_update : of the run; NaN where it failed        rejected : ticks in which it did not believe something,
-    None where it does not say               failure : one line, empty where it did not fail
-    known : what it was given of the instruments, or has learnt      refused : samples not believed, by instrument
+    log : reference, measurements and estimates      first : the first row that it was given
+    ns_per_update : NaN if it failed                 failure : one line, empty if it did not fail
+    rejected : ticks in which it rejected a sample, None if it does not say
+    known : what it knew about the instruments, or learnt      refused : rejected samples, by instrument
     """
 
     estimator: str
@@ -107,7 +100,7 @@ class Replayed:
     refused: Mapping[str, int] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """The numbers, named with their units; None where there is nothing to measure."""
+        """The numbers, named with their units; None for those that could not be measured."""
         numbers = {**self.scores, "ns_per_update": self.ns_per_update}
         plain: dict[str, Any] = {name: v if math.isfinite(v) else None for name, v in numbers.items()}
         failure = {"failure": self.failure} if self.failure else {}
@@ -122,11 +115,11 @@ class Replayed:
 
 
 def make(spec: str | Maker, params: Mapping[str, Any], instruments: Instruments | None = None) -> Equipped:
-    """The estimator of that name, with what is known of the instruments and some of its parameters changed.
+    """The estimator `spec`, with what is known about the instruments and with the parameters `params`.
 
     Raises
     ------
-    ValueError      one line: no such estimator or parameter; the oracle, for which no log holds the truth
+    ValueError      one line: no such estimator or parameter; the oracle, since no log holds the truth it needs
     """
     made = equipped(spec, instruments, {name: literal(value) for name, value in params.items()})
     if issubclass(type(made.code), Oracle):
@@ -144,9 +137,9 @@ def replay(
 ) -> Replayed:
     """Run the estimator `spec` over `log` and score it.
 
-    params : by name; what the log says of its instruments (`RecordedLog.known`) holds where they do not
-    withheld : names of properties of the instruments that it is not given, whatever the log says; where these are all
-        of them, no calibration from before the log either
+    params : by name; they take precedence over what the log says about its instruments (`RecordedLog.known`)
+    withheld : properties of the instruments to hide from it, whatever the log says; if these are all, the calibration
+        before the log is hidden too
 
     Raises
     ------
@@ -182,14 +175,14 @@ def replay(
 
 
 def gone(spec: str | Maker, failure: str) -> Replayed:
-    """What there is of an estimator that took the process with it: no row, and why."""
+    """The result for an estimator that ended the process: no rows, and the failure."""
     scores = dict.fromkeys(SCORES, math.nan)
     return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, scores, failure)
 
 
 def known_to(log: RecordedLog, withheld: Sequence[str] = ()) -> Instruments:
-    """What an estimator is given of the instruments of `log`; where all is withheld, no calibration either."""
-    unknown = _all_of(withheld)  # nor is it given what was measured before the log
+    """What an estimator is given about the instruments of `log`; if all is withheld, no calibration either."""
+    unknown = _all_of(withheld)  # then also hide what was measured before the log
     of_log = {name: entry for name, entry in log.known.items() if not (unknown and name.startswith("calibration."))}
     return Instruments(of_log, withheld=withheld)
 
@@ -199,7 +192,7 @@ def _all_of(withheld: Sequence[str]) -> bool:
 
 
 class _Said(NamedTuple):
-    """What an estimator says of itself after a replay."""
+    """What an estimator reports after a replay."""
 
     known: Mapping[str, Known]
     rejected: int | None
@@ -207,7 +200,7 @@ class _Said(NamedTuple):
 
 
 def _said(estimator: object, known: Mapping[str, Known], t_s: float) -> _Said:
-    """What `estimator` says after its replay; FlightCodeFailed or PluginError where that is rubbish."""
+    """What `estimator` reports after its replay; FlightCodeFailed or PluginError if that is invalid."""
     told = learnt(estimator, known)
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, t_s):
         rejected = getattr(estimator, "rejected", None)
@@ -229,9 +222,9 @@ def _count(name: str, value: object) -> int:
 
 
 def at_rest(rows: NDArray[Any]) -> ImuSample | None:
-    """Mean inertial sample of `rows` where they are of something that stood or was held; None else.
+    """Mean inertial sample of `rows` if the aeroplane was at rest or held still; otherwise None.
 
-    The limits are those within which estimators take a mean sample for one at rest, and no GPS that says otherwise.
+    The limits are those of the estimators for a mean sample at rest; the GPS must not contradict it.
     """
     gyro, force = rows["gyro_b_rad_s"].mean(axis=0), rows["force_b_m_s2"].mean(axis=0)
     still = float(np.abs(gyro).max()) < AT_REST_RAD_S
@@ -248,13 +241,13 @@ def judged_rows(log: RecordedLog, window: Window, first: int = 0) -> NDArray[np.
 
 
 def why_none(log: RecordedLog, window: Window, first: int = 0) -> str:
-    """Why no row is judged, in one line; empty where some are."""
+    """Why no row is judged, in one line; empty if some are."""
     judged, why = _judged(log, window, first)
     return "" if judged.any() else why
 
 
 def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bool_], str]:
-    """Rows that are judged, shape (N,), and what left none of them if there are none."""
+    """Rows that are judged, shape (N,), and the reason if there are none."""
     rows, reference = log.rows, log.reference
     if reference is None:
         return np.zeros(len(rows), np.bool_), "the log holds no attitude to score against: --reference FILE"
@@ -263,19 +256,19 @@ def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bo
         return judged, _why_unknown(log, reference.name)
     if reference.kind == "firmware":
         return judged, ""
-    if "gps" in log.instruments and window.airborne_m_s > 0.0:
+    if "gps" in log.sensors and window.airborne_m_s > 0.0:
         judged &= flying(rows, window.airborne_m_s)
         if not judged.any():
             fastest = float(rows["gps_speed_m_s"][rows["gps_new"] > 0].max(initial=0.0))
             why = (
-                f"never above {window.airborne_m_s:g} m/s over the ground while there is a reference (the fastest fix: "
+                f"ground speed never above {window.airborne_m_s:g} m/s while there is a reference (fastest fix: "
                 f"{fastest:.1f} m/s); --airborne 0 judges all rows"
             )
             return judged, why
     judged &= np.arange(len(rows)) >= first
     if judged.any():
         judged &= rows["t_s"] > rows["t_s"][np.argmax(judged)] + window.settle_s
-    return judged, f"what could be judged ends within the {window.settle_s:g} s to settle; choose a shorter --settle"
+    return judged, f"nothing is left after {window.settle_s:g} s to settle; choose a shorter --settle"
 
 
 def _why_unknown(log: RecordedLog, name: str) -> str:
@@ -284,15 +277,15 @@ def _why_unknown(log: RecordedLog, name: str) -> str:
         return log.reference.why_none
     entry = log.ledger.get("reference")
     if entry is None or entry.used or not entry.left_out:
-        return f"{name} has no attitude at the times of the log; are their clocks the same?"
+        return f"{name} has no attitude at the times of the log; do both use one clock?"
     reasons = ", ".join(f"{n} {reason}" for reason, n in entry.left_out.items())
-    return f"{name}: none of it can be used, {reasons}"
+    return f"{name}: no attitude can be used: {reasons}"
 
 
 def flying(rows: NDArray[Any], airborne_m_s: float) -> NDArray[np.bool_]:
-    """Rows in which the aeroplane flies, by the ground speed of the fixes around them, shape (N,).
+    """Rows in which the aeroplane is airborne, by the ground speed of the fixes around them, shape (N,).
 
-    A fix counts until the next one, or while it is fresh.  In a longer silence of the GPS the aeroplane flies where it
+    A fix counts until the next one, while it is fresh.  In a longer gap of the GPS the aeroplane is taken to fly if it
     flew both before and after.
     """
     fixes = np.flatnonzero(rows["gps_new"])
@@ -324,18 +317,18 @@ def score(R_eb: Array, log: RecordedLog, judged: NDArray[np.bool_]) -> dict[str,
 
 
 def as_flight(log: RecordedLog, replayed: Replayed, window: Window) -> Flight:
-    """The replay as a flight, for the recorder and the viewer: the reference where the truth would be."""
+    """The replay as a flight for the recorder and the viewer, with the reference in place of the truth."""
     t_s = log.rows["t_s"]
     start_s = float(t_s[0] - log.rows["dt_s"][0])
     outcome = Outcome.ESTIMATOR_FAILED if replayed.failure else Outcome.COMPLETED
-    reference = log.reference.name if log.reference else "nothing: the log has no attitude"
+    reference = log.reference.name if log.reference else "none: the log has no attitude"
     events = events_of(replayed.log, outcome, replayed.failure)
     events += tuple(Event(start_s, line, "warn") for line in log.repairs)
     manifest: dict[str, Any] = {
         "scenario": f"replay of {log.name}",
         "estimator": replayed.estimator,
         "reference": reference,
-        "instruments": log.instruments,
+        "sensors_in_log": log.sensors,
         "repairs": log.repairs,
         "ledger": log.ledger.to_json(),
         "known": to_json(Instruments(log.known)),
@@ -350,7 +343,7 @@ def as_flight(log: RecordedLog, replayed: Replayed, window: Window) -> Flight:
         float(np.median(log.rows["dt_s"])),
         start_s,
         outcome,
-        "nose",  # a log's reference has a nose; its course is that of the same GPS
+        "nose",  # a reference has a nose; its course would be that of the same GPS
         replayed.failure,
         tuple(sorted(events, key=lambda event: event.t_s)),
         manifest,
@@ -380,14 +373,14 @@ def _run(
     flown: NDArray[Any],
     advance: console.Advance,
 ) -> float:
-    """Fill `flown` from row `first` on; returns nanoseconds an update.
+    """Fill `flown` from row `first` on; returns nanoseconds per update.
 
-    The estimator is given copies: nothing that it writes into them is judged, or seen by another.  A row that is
-    refused is left as if nothing had been estimated.
+    The estimator gets copies, so that nothing it writes into them is judged or seen by another one.  A rejected
+    estimate leaves its row empty.
     """
     total, began_s = len(rows), float(rows["t_s"][first])
     writeable, rows = rows.flags.writeable, rows.copy()
-    rows.flags.writeable = writeable  # as it was: kernels are compiled for it
+    rows.flags.writeable = writeable  # kernels are compiled for it
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
         replay = getattr(estimator, "replay", None)
     power_up(estimator, _copied(on_ground))
@@ -403,7 +396,7 @@ def _run(
                 advance(k, total)
         return 1e9 * (time.perf_counter() - began) / (total - first)
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
-        replay(rows[first : first + 1])  # compiles, where that has not been done
+        replay(rows[first : first + 1])  # compiles, if necessary
     spent, least = 0.0, math.inf
     for i in range(REPEATS):
         power_up(estimator, _copied(on_ground))
@@ -432,8 +425,8 @@ def _copied(on_ground: ImuSample | None) -> ImuSample | None:
 
 
 def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:
-    """Fill the table of the truth with what a log knows of it: the reference attitude, and the way by GPS."""
-    rows, n = log.rows, len(log.rows)
+    """Fill the table of the truth from the log: the reference attitude, and the track by GPS."""
+    rows = log.rows
     truth["t_s"] = rows["t_s"]
     truth["phase"] = Phase.FLYING
     for name in _UNKNOWN:
@@ -442,8 +435,8 @@ def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:
     truth["R_eb"] = np.eye(3)
     if log.reference is not None:
         known = log.reference.known
-        if known.any():  # the last known attitude, before the first one that
-            last = np.maximum.accumulate(np.where(known, np.arange(n), -1))
+        if known.any():  # the last known attitude; before the first, the first
+            last = latest(known)
             truth["R_eb"] = log.reference.R_eb[np.where(last < 0, np.argmax(known), last)]
     fixes = np.flatnonzero(rows["gps_new"])
     for table, measured in (("p_e_m", "gps_p_e_m"), ("v_e_m_s", "gps_v_e_m_s")):

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import estimator as package
-from estimator.blocks.magnetometer import Calibration
+from estimator.blocks.calibration import Calibration
 from estimator.interface import MEASURED_DTYPE, ImuSample, Measurements
 from estimator.peers.peers import Imufusion
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad

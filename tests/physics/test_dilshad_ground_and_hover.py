@@ -29,8 +29,8 @@ import numpy as np
 import pytest
 
 from autopilot.interface import NEUTRAL
+from estimator.blocks.calibration import Calibration
 from estimator.blocks.kernels import wrap
-from estimator.blocks.magnetometer import Calibration
 from estimator.dilshad import Dilshad, DilshadParams, heading_of_field, paper_angles
 from estimator.interface import ImuSample
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad

@@ -112,7 +112,7 @@ def check_others(log, path):
     field = 0.1 * columns(inside, "MagX", "MagY", "MagZ")
     np.testing.assert_allclose(rows["mag_b_ut"][at], field, rtol=0, atol=1e-5)  # its multiplier is a float of 24 bits
     arsp = messages(path, "ARSP")
-    if arsp and "airspeed" in log.instruments:
+    if arsp and "airspeed" in log.sensors:
         good = [m for m in arsp if m["H"] and m["U"]]
         at = rows_of(columns(good, "t")[:, 0], rows)
         assert np.flatnonzero(rows["air_new"]).tolist() == at.tolist()
@@ -168,7 +168,7 @@ def test_ulog_is_read_as_by_pyulog(name):
     for entry in log.ledger.values():
         assert entry.agrees
     gps = theirs.get(("vehicle_gps_position", 0))
-    assert (gps is not None) == ("gps" in log.instruments)
+    assert (gps is not None) == ("gps" in log.sensors)
     if gps is not None:
         new = np.flatnonzero(rows["gps_new"])
         north = np.array([gps["vel_n_m_s"][gps["timestamp"] <= round(1e6 * rows["t_s"][k])][-1] for k in new])

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from estimator.gains import recommended_gains
 from estimator.interface import MEASURED_DTYPE, ImuSample
+from estimator.params.gains import recommended_gains
 from estimator.premerlani import Premerlani, PremerlaniParams
 from estimator.rotation import from_euler, heading_error_rad, inclination_error_rad
 

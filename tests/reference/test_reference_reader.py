@@ -21,7 +21,7 @@ def test_input_is_read_with_the_truth_beside_it(name):
     log = reference.read(DATA / folder / f"{name}_in.csv.gz")
     np.testing.assert_allclose(np.diff(log.rows["t_s"]), 1.0 / imu_hz, rtol=0, atol=1e-9)
     assert log.rows["gps_new"].mean() == pytest.approx(0.1, rel=0, abs=1e-3)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     assert log.reference is not None
     assert log.reference.kind == "truth"
     np.testing.assert_allclose(log.reference.R_eb[0], [[0.8660254, -0.5, 0], [0.5, 0.8660254, 0], [0, 0, 1]], atol=1e-7)
@@ -37,7 +37,7 @@ def test_columns_between_two_samples_hold_the_last():
         changed = np.flatnonzero(np.any(np.diff(rows[column], axis=0) != 0.0, axis=1)) + 1
         assert np.all(rows[new][changed] == 1)
     bench = reference.read(DATA / "ap_ahrs_dcm" / "E100_in.csv.gz")
-    assert bench.instruments == ("gyro", "accelerometer", "magnetometer")
+    assert bench.sensors == ("gyro", "accelerometer", "magnetometer")
     assert not bench.rows["gps_valid"].any()
 
 
@@ -55,7 +55,7 @@ def test_output_of_the_firmware_can_be_the_reference():
     ("text", "said"),
     [
         ("t,dt\n1,2\n", "no column gx, gy, gz"),
-        (",".join(reference.INPUT) + "\n" + "1," * 20 + "x\n", "line 2, column gps_d: 'x' is no number"),
+        (",".join(reference.INPUT) + "\n" + "1," * 20 + "x\n", "line 2, column gps_d: 'x' is not a number"),
         (",".join(reference.INPUT) + "\n1,2\n", "line 2: 2 cells; the header has 21"),
         (",".join(reference.INPUT) + "\n", "no row of numbers"),
     ],

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from estimator.blocks.magnetometer import Calibration
+from estimator.blocks.calibration import Calibration
 from estimator.gps_velocity import GpsVelocityMagnetometer, GpsVelocityParams
 from estimator.interface import MEASURED_DTYPE
 from estimator.rotation import from_euler, heading_rad

@@ -354,7 +354,7 @@ def test_quirks_can_be_typed_and_the_original_takes_settings():
     ("setting", "said"),
     [
         ({"quirks": "vertical_clip,typo"}, "quirks has 'typo'"),
-        ({"quirks": frozenset({"typo"})}, "quirks has 'typo'; there are compass_is_no_yaw, "),
+        ({"quirks": frozenset({"typo"})}, "quirks has 'typo'; choose from compass_is_no_yaw, "),
         ({"kp": -0.1}, "kp is -0.1; it must be a finite number, zero or more"),
         ({"ki_yaw": math.inf}, "ki_yaw is inf"),
         ({"gps_gain": 1.5}, "gps_gain is 1.5; it must be 0 to 1"),

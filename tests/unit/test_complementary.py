@@ -140,7 +140,7 @@ def test_health_starts_is_good_with_a_course_and_poor_without():
 def test_params_that_cannot_be_are_rejected(change):
     """One line with the field, the value and what is right."""
     (name,) = change
-    with pytest.raises(ValueError, match=f"{name} is .* s; it must be"):
+    with pytest.raises(ValueError, match=f"{name} is .*; it must be"):
         ComplementaryParams(**change)
 
 

@@ -180,7 +180,7 @@ def test_command_line_of_all_air_reaches_the_manifest_in_plain_numbers(tmp_path,
         (("--shear", "x"), "air.shear = 'x': must be a number"),
         (("--gust", "banana"), "gust = 'banana': write speed@start, for instance 4@12s"),
         (("--turbulence", "lots"), "turbulence = 'lots': write calm, light, moderate, severe"),
-        (("--thermals", "lots"), "thermals = 'lots': write how many"),
+        (("--thermals", "lots"), "thermals = 'lots': write their number"),
     ],
 )
 def test_command_line_air_that_makes_no_sense_is_one_line(command, arguments, says, tmp_path, monkeypatch, capfd):

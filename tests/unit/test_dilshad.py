@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator import dilshad
+from estimator.blocks.calibration import Calibration
 from estimator.blocks.kernels import wrap
-from estimator.blocks.magnetometer import Calibration
 from estimator.dilshad import Dilshad, DilshadParams, heading_of_field, paper_angles
 from estimator.interface import G_M_S2 as G
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample

@@ -51,7 +51,7 @@ def test_exported_rows_come_back_bit_for_bit(flown):
         if has_air or name != "baro_height_m":
             np.testing.assert_array_equal(text.rows[name], ours.rows[name], err_msg=name)
     np.testing.assert_array_equal(text.reference.R_eb, ours.reference.R_eb)
-    assert (text.reference.kind, text.instruments, text.place) == ("truth", ours.instruments, ours.place)
+    assert (text.reference.kind, text.sensors, text.place) == ("truth", ours.sensors, ours.place)
     assert {n: (e.read, e.used) for n, e in text.ledger.items()} == {
         n: (e.read, e.used) for n, e in ours.ledger.items()
     }

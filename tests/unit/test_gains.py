@@ -8,8 +8,8 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from estimator.gains import error_after, recommended_gains, recovery_time_s
 from estimator.interface import G_M_S2, MEASURED_DTYPE
+from estimator.params.gains import error_after, recommended_gains, recovery_time_s
 from estimator.premerlani import Premerlani, PremerlaniParams
 from estimator.rotation import heading_rad, inclination_error_rad
 

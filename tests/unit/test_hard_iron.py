@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from autopilot.interface import NEUTRAL
-from estimator.blocks.magnetometer import hard_iron_from_extremes
+from estimator.blocks.calibration import hard_iron_from_extremes
 from sim import place
 from sim.clock import Rates
 from sim.log import Log

@@ -96,7 +96,7 @@ def test_field_that_is_not_the_earths_is_told_and_kept(log):
     log.rows["mag_new"], log.rows["mag_b_ut"] = 1, [0.2, 0.0, 0.4]
     found = mended(log, HERE)
     np.testing.assert_array_equal(found.rows["mag_b_ut"], log.rows["mag_b_ut"])
-    assert found.repairs == ("column mag: 0.447 uT is not the earth's field; kept as it is",)
+    assert found.repairs == ("column mag: 0.447 uT is not the earth's field; kept",)
 
 
 def test_log_of_one_row_is_refused(log):
@@ -137,7 +137,7 @@ def test_recording_of_ours_comes_back_bit_for_bit(log, tmp_path):
     for path in (folder, folder / recording.PARQUET):
         found = logs.read(path)
         assert found.rows.tobytes() == log.rows.tobytes()
-        assert (found.name, found.reference.kind, found.instruments) == ("flight", "truth", log.instruments)
+        assert (found.name, found.reference.kind, found.sensors) == ("flight", "truth", log.sensors)
         np.testing.assert_array_equal(found.reference.R_eb, flown.truth["R_eb"])
     (tmp_path / "empty").mkdir()
     with pytest.raises(LogError, match="no recording at"):

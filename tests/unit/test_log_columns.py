@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimator.instruments import Known
-from scenarios.harness.logs import tabular
+from scenarios.harness.logs import column_groups
 from scenarios.harness.logs.checks import Source
 from scenarios.harness.logs.column_map import MAPS, ColumnMap, load
 from scenarios.harness.logs.quantities import INERTIAL
@@ -29,7 +29,7 @@ def test_load_reads_sign_quantity_and_unit(tmp_path):
     factors = {name: meaning.factor for name, meaning in found.columns.items()}
     assert factors == pytest.approx({"A": -9.80665, "B": np.pi / 180, "C": 100.0, "D": 1e-6, "E": 1.0}, rel=1e-15)
     assert (found.columns["A"].quantity, found.delimiter, found.skip_lines) == ("force.z", ";", 3)
-    assert [found.columns[c].told for c in "AE"] == [True, False]
+    assert [found.columns[c].unit_given for c in "AE"] == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_load_understands_spellings_of_a_unit(tmp_path, entry, factor):
     """In any case, with the usual words and signs; by the definitions of the units."""
     found = load(written(tmp_path, f'[columns]\na = "{entry}"')).columns["a"]
     assert found.factor == pytest.approx(factor, rel=1e-12)
-    assert found.told
+    assert found.unit_given
 
 
 def test_load_scale_is_factor_times_number_less_offset(tmp_path):
@@ -59,7 +59,7 @@ def test_load_scale_is_factor_times_number_less_offset(tmp_path):
     text = '[columns]\nt = "time"\nw = { is = "-gyro.x", unit = "deg/s", factor = 0.0305, offset = 512 }'
     meanings = load(written(tmp_path, text))
     columns = {"t": np.array([0.0, 1.0]), "w": np.array([512.0, 712.0])}
-    (group,), _ = tabular.take(columns, meanings, Source(tmp_path))
+    (group,), _ = column_groups.take(columns, meanings, Source(tmp_path))
     np.testing.assert_allclose(group.table["gyro.x"], [0.0, -6.1 * DEG], rtol=0, atol=1e-15)
 
 
@@ -76,8 +76,8 @@ def test_load_axes_turn_gyro_force_and_field_together(tmp_path, axes, forward, r
     meanings = load(written(tmp_path, f'axes = "{axes}"\n'))
     numbers = np.array([1.0, 2.0, 3.0])
     table = {f"{v}.{a}": np.array([n]) for v in ("gyro", "force", "mag") for a, n in zip("xyz", numbers, strict=True)}
-    group = tabular.Group(table)
-    tabular.turn(group, meanings)
+    group = column_groups.Group(table)
+    column_groups.turn(group, meanings)
     wanted = [numbers[abs(i)] * (1 if i >= 0 else -1) for i in (forward, right, down)]
     if signs is not None:
         wanted = [s * numbers[abs(i)] for s, i in zip(signs, (forward, right, down), strict=True)]
@@ -95,10 +95,9 @@ def test_load_reads_the_form_of_a_file_and_what_its_attitude_is(tmp_path):
     assert (found.origin_deg, found.force_reversed, found.columns) == ((47.0, 8.5), True, {})
 
 
-@pytest.mark.parametrize("table", ["instruments", "suits"])
-def test_load_instruments_are_properties_or_parameters_of_an_estimator(tmp_path, table):
-    """Numbers and truth values; `fly_forward` is a parameter of ap_dcm alone; [suits] is the older name."""
-    text = f"[{table}]\ngps_latency_s = 0.2\ngps_stamped = true\nfly_forward = 0\n"
+def test_load_instruments_are_properties_or_parameters_of_an_estimator(tmp_path):
+    """Numbers and truth values; `fly_forward` is a parameter of ap_dcm alone."""
+    text = "[instruments]\ngps_latency_s = 0.2\ngps_stamped = true\nfly_forward = 0\n"
     known = load(written(tmp_path, text)).known
     assert known == {
         "gps_latency_s": Known(0.2, "log", "own.toml"),
@@ -117,27 +116,30 @@ def test_load_instruments_are_properties_or_parameters_of_an_estimator(tmp_path,
         ("columns = 3", "columns must be a table"),
         ('[columns]\na = "gyro.w"', "a = 'gyro.w': unknown quantity 'gyro.w': did you mean"),
         ('[columns]\na = "gyro.x uT"', "unit 'uT' of gyro.x must be one of rad/s, deg/s"),
-        ('[columns]\na = "gyro.x counts"', r"counts is no unit: say what one of them is.*factor = 0\.001"),
-        ('[columns]\na = "gyro.x"\nb = "gyro.x"', "gyro.x is the meaning of two columns, a and b"),
+        ('[columns]\na = "gyro.x counts"', r"counts is not a unit: give the size of one.*factor = 0\.001"),
+        ('[columns]\na = "gyro.x"\nb = "gyro.x"', "gyro.x is assigned to two columns, a and b"),
         ('[columns]\na = { is = "gyro.x", unit = "deg/s", facter = 2 }', "unknown entry 'facter': did you mean factor"),
         ('[columns]\na = { is = "gyro.x", factor = 0 }', "factor = 0 would make every value zero"),
         ('[columns]\na = { is = "gyro.x", offset = "b" }', "offset = 'b' must be a number"),
         ('[columns]\na = { unit = "deg/s" }', r"write \{ is = "),
-        ('[columns]\n[suits]\ngps_latency_s = "b"', r"\[suits\] gps_latency_s = 'b' must be a number, true or false"),
+        (
+            '[columns]\n[instruments]\ngps_latency_s = "b"',
+            "gps_latency_s = 'b' must be a number, true or false",
+        ),
         ("[instruments]\ngps_lateny_s = 1", r"gps_lateny_s: no such property: did you mean gps_latency_s"),
         ("[instruments]\nfly_foward = 1", r"fly_foward: no such property: did you mean fly_forward\?$"),
         ("[instruments]\ngps_latency_s = inf", "gps_latency_s = inf must be a number"),
         ('delimiter = ",,"\n[columns]', "delimiter = ',,' must be one character"),
         ('decimal = ";"', "decimal = ';' must be"),
         ("skip_lines = -1", "skip_lines = -1 must be a whole number"),
-        ("names = 3", "names must be a list"),
+        ("names = 3", "names = 3 must be a list"),
         ('axes = "forward-left-down"', "left-handed"),
-        ('axes = "forward-back-up"', "say where x, y and z point"),
-        ('axes = "north-east-down"', "say where x, y and z point"),
+        ('axes = "forward-back-up"', "give the directions of x, y and z"),
+        ('axes = "north-east-down"', "give the directions of x, y and z"),
         ('force_reversed = "yes"', "must be true or false"),
         ('reference = "gold"', "reference = 'gold' must be truth, filter or firmware"),
         ('withheld = ["gps_rate"]', "withheld 'gps_rate': did you mean gps_rate_hz"),
-        ('withheld = ["gps_rate_hz"]\n[instruments]\ngps_rate_hz = 4', "withheld 'gps_rate_hz': it has a value too"),
+        ('withheld = ["gps_rate_hz"]\n[instruments]\ngps_rate_hz = 4', "withheld 'gps_rate_hz': it also has a value"),
         ("origin_deg = [100, 0]", "must be a latitude and a longitude"),
     ],
 )
@@ -162,7 +164,7 @@ def test_every_shipped_map_has_what_a_replay_needs(path):
         assert found.R_bs is not None or found.force_reversed
         return
     assert {"time", *INERTIAL} <= {m.quantity for m in found.columns.values()}
-    assert all(m.told for m in found.columns.values())
+    assert all(m.unit_given for m in found.columns.values())
 
 
 def test_map_without_columns_recognises_them():

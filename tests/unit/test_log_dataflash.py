@@ -121,7 +121,7 @@ def test_log_is_read_as_it_was_written(logged, demand_same_rows, write):
     """Every column to the resolution of its format, every arrival in its tick, the simulator's attitude as truth."""
     log = write(Writer(TODAY).log(messages(logged)))
     demand_same_rows(log.rows, logged.expected(stamped=False), RESOLUTION)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     assert (log.repairs, log.notes) == ((), (ONE_READ,))
     assert log.place == pytest.approx((47.4, 8.5), rel=0, abs=1e-7)
     assert log.reference is not None
@@ -174,7 +174,7 @@ def test_log_of_2013_is_read_as_it_was_written(logged, demand_same_rows, write):
     # Speed in whole cm/s, course in hundredths of a degree of 30 m/s.
     coarse = {"gps_speed_m_s": 0.0051, "gps_course_rad": 1e-4, "gps_v_e_m_s": 0.008}
     demand_same_rows(log.rows, expected, RESOLUTION | coarse)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer")
     assert log.reference is not None
     assert (log.reference.kind, log.reference.name) == ("filter", "ATT in flight.BIN")
     np.testing.assert_allclose(log.reference.R_eb, logged.R_eb, rtol=0, atol=1.6e-4)  # 0.005 degrees of each angle
@@ -226,7 +226,7 @@ def test_gyro_and_accelerometer_of_their_own_meet_at_the_times_of_the_gyro(logge
     assert log.repairs == ("column AccX (force.x): 1 without a number left out, first GYR 1000",
                            "column AccY (force.y): 1 without a number left out, first GYR 1000",
                            "column AccZ (force.z): 1 without a number left out, first GYR 1000")  # fmt: skip
-    assert log.instruments == ("gyro", "accelerometer")
+    assert log.sensors == ("gyro", "accelerometer")
 
 
 def test_fix_of_less_than_three_dimensions_and_sick_sensors_are_not_used(logged, write):
@@ -275,8 +275,8 @@ def test_bytes_that_are_no_record_are_left_out_and_counted(logged, demand_same_r
     ]
     log = write(damaged)
     first = sum(map(len, records[:300]))
-    assert log.repairs[0] == f"{sum(lost)} bytes that are no whole record left out, first at byte {first}"
-    assert log.repairs[1] == "20 bytes at the end are no whole record: left out"
+    assert log.repairs[0] == f"{sum(lost)} bytes outside complete records left out, first at byte {first}"
+    assert log.repairs[1] == "20 bytes at the end are not a complete record: left out"
     assert len(log.rows) >= 998
     known = np.isin(logged.t_us / 1e6, log.rows["t_s"])
     np.testing.assert_allclose(log.rows["gyro_b_rad_s"], logged.rate[known], rtol=0, atol=1e-7)
@@ -322,7 +322,7 @@ def test_definition_before_damaged_bytes_is_kept(logged, demand_same_rows, write
     records = Writer(TODAY, told=False).log(messages(logged))
     log = write([records[0], bytes(9), *records[1:]])
     demand_same_rows(log.rows, logged.expected(stamped=False), RESOLUTION)
-    assert log.repairs == (f"9 bytes that are no whole record left out, first at byte {len(records[0])}",)
+    assert log.repairs == (f"9 bytes outside complete records left out, first at byte {len(records[0])}",)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -349,13 +349,13 @@ def test_log_damaged_anywhere_is_read_or_refused_in_one_line(logged, write, seed
     ("raw", "said"),
     [
         (b"", r"the file is empty, not an ArduPilot DataFlash log \(\.bin\)"),
-        (bytes(range(256)) * 4, "no DataFlash log: no message is defined in its 1024 bytes"),
+        (bytes(range(256)) * 4, "not a DataFlash log: no message is defined in its 1024 bytes"),
         (
             Writer(TODAY).raw,
             r"no inertial unit \(IMU, or GYR and ACC\): set bit 7 \(IMU\) or bit 19 \(raw IMU\) of LOG_BITMASK; "
             "it has FMT, FMTU, MULT, UNIT",
         ),
-        (Writer(TODAY).raw[:50], "no DataFlash log"),
+        (Writer(TODAY).raw[:50], "not a DataFlash log"),
     ],
 )
 def test_file_without_an_inertial_unit_is_refused(write, raw, said):
@@ -402,5 +402,5 @@ def test_attitude_without_a_number_is_one_that_cannot_be_judged(logged, write):
     log = write(Writer(TODAY).log(told))
     entry = log.ledger["reference"]
     assert (entry.read, entry.used, entry.left_out) == (len(logged.t_us), 0, {"no attitude": len(logged.t_us)})
-    said = f"SIM in flight.BIN: none of it can be used, {len(logged.t_us)} no attitude"
+    said = f"SIM in flight.BIN: no attitude can be used: {len(logged.t_us)} no attitude"
     assert why_none(log, Window()) == said

@@ -123,7 +123,7 @@ def test_parameters_of_a_simulator_are_not_read(known):
 def test_airspeed_that_the_firmware_does_not_use_is_not_given(logged, known):
     """ARSPD_USE 0: it stands in the ledger with that reason."""
     log = known({"ARSPD_USE": 0})
-    assert "airspeed" not in log.instruments
+    assert "airspeed" not in log.sensors
     assert not log.rows["air_new"].any()
     assert log.known["use_airspeed"] == Known(False, "log", "ARSPD_USE")
     entry = log.ledger["airspeed"]
@@ -153,7 +153,7 @@ def test_compass_that_the_firmware_does_not_use_is_not_given(logged, known):
     assert any("MAG 1 (of 0, 1)" in line for line in log.notes)
     for off in ({"COMPASS_USE": 0, "COMPASS_USE2": 0}, {"COMPASS_ENABLE": 0, "COMPASS_USE": 1}):
         log = known(off, more=second)
-        assert "magnetometer" not in log.instruments
+        assert "magnetometer" not in log.sensors
         reason = "COMPASS_ENABLE is 0" if "COMPASS_ENABLE" in off else "COMPASS_USE is 0"
         assert log.ledger["magnetometer"].left_out == {reason: len(logged.field_us)}
         assert log.known["use_magnetometer"] == Known(False, "log", reason.split()[0])

@@ -237,7 +237,7 @@ def test_message_whose_columns_are_others_is_reported(read):
     log = read(lambda m: m if m[1] != "MAG" else (*m[:2], m[2][:4]),
                formats={"MAG": ("QBhh", "TimeUS,I,MagX,MagY", "s#GG", "F-CC")})  # fmt: skip
     assert any(line.startswith("MAG has no MagZ: ") and line.endswith(" messages not read") for line in log.repairs)
-    assert "magnetometer" not in log.instruments
+    assert "magnetometer" not in log.sensors
 
 
 def test_stamps_that_jitter_are_no_loss(logged, read):

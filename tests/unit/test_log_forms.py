@@ -162,7 +162,7 @@ def test_date_among_times_of_day_is_refused_with_its_line(held, write):
     lines = held.lines(held.columns())
     rows = [f"12:00:{2 + 0.02 * k:06.3f},{line.partition(',')[2]}" for k, line in enumerate(lines[1:])]
     rows[40] = rows[40].replace("12:00:", "noon ")
-    with pytest.raises(LogError, match=r"line 42, column t: 'noon 02\.800' is no time of day like those above it"):
+    with pytest.raises(LogError, match=r"line 42, column t: 'noon 02\.800' is not a time of day like those above it"):
         write([lines[0], *rows])
 
 
@@ -171,7 +171,7 @@ def test_lines_above_the_header_are_passed_over(held, write):
     lines = held.lines(held.columns())
     found = write(["Logger,v1.2", "Serial,123", "", *lines])
     assert found.rows.tobytes() == write(lines).rows.tobytes()
-    assert found.repairs == ("2 lines above the header passed over",)
+    assert found.repairs == ("2 lines above the header skipped",)
 
 
 def test_file_without_a_header_needs_names_in_a_map(held, write):
@@ -187,16 +187,16 @@ def test_file_without_a_header_needs_names_in_a_map(held, write):
     ("change", "said"),
     [
         (lambda lines: [lines[0], *(line.replace(".", ",") for line in lines[1:])],
-         r"line 2: \d+ cells; the header has 12: decimal commas between commas cannot be told apart"),
+         r"line 2: \d+ cells; the header has 12: commas between cells may be decimal commas"),
         (lambda lines: [line.replace(",", ";").replace("0.02;", "0,02;") for line in lines],
-         r"are both in it: say in a column map which is the decimal sign"),
+         r"occur: give the decimal sign in a column map"),
         (lambda lines: [lines[0].replace("gx", "gx (counts)"), *lines[1:]],
          r'no column for gyro\.x.*one in counts as "gx \(counts\)" = \{ is = "gyro\.x"'),
         (lambda lines: [lines[0].replace("vn", "gyro_x").replace("ve", "gyro_y").replace("roll", "gyro_z"),
-                        *lines[1:]], r"gyro\.x may be gx or gyro_x: say which in a column map"),
-        (lambda _: ["hello", "1", "2"], "no columns in it, the first line is 'hello'"),
+                        *lines[1:]], r"gyro\.x may be gx or gyro_x: choose one in a column map"),
+        (lambda _: ["hello", "1", "2"], "no columns found, the first line is 'hello'"),
         (lambda lines: [lines[0].replace("gy", "gx"), *lines[1:]], "two columns are named 'gx'"),
-        (lambda _: ["a,b", "1,2", "3,4"], "no column whose name is understood; it has a, b"),
+        (lambda _: ["a,b", "1,2", "3,4"], "no column name is recognised; it has a, b"),
         (lambda lines: ["recorded", *lines[:1]], "line 2: 12 cells; the header has 1"),
     ],
 )  # fmt: skip
@@ -246,7 +246,7 @@ def test_remedies_of_the_refusal_work(held, write, columns, axes, tmp_path):
         gyro, force = gyro * axes, force * axes
     for i, a in enumerate("xyz"):
         table[f"g{a}"], table[f"a{a}"] = gyro[:, i], force[:, i]
-    with pytest.raises(LogError, match=rf"is the median of z.*--columns {columns}") as error:
+    with pytest.raises(LogError, match=rf"the median of z is.*--columns {columns}") as error:
         write(held.lines(table), "other.csv")
     assert "\n" not in str(error.value)
     found = logs.read(tmp_path / "other.csv", columns=columns)

@@ -55,7 +55,7 @@ def test_samples_lost_are_counted_through_the_jitter():
     """As many as were taken out; after each the next step is 32 to 48 ms, and others are up to 28 ms."""
     lost = np.arange(100, 3900, 190)
     (line,) = mended(log_of(np.delete(jittered(4000, 0.004), lost)), Path("log.csv")).repairs
-    assert line.startswith(f"{len(lost)} samples lost, the next stands for them; first at ")
+    assert line.startswith(f"{len(lost)} samples lost, covered by the next one; first at ")
 
 
 def test_late_stamp_near_a_gap_is_no_second_one():

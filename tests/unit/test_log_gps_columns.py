@@ -60,7 +60,7 @@ def test_stamps_of_another_clock_are_not_used(held, read):
     log = read({"vn": vn, "ve": ve, "gps_time": week})
     assert np.isnan(log.rows["gps_t_s"]).all()
     assert log.known["gps_stamped"].value is False
-    assert "gps.time is -345600 s before the arrival of the fixes, a time of another clock: not used" in log.repairs
+    assert "gps.time is -345600 s before the arrival of the fixes, so on another clock: not used" in log.repairs
 
 
 def test_stamps_in_the_unit_of_the_time_are_converted_with_it(held, read):
@@ -134,7 +134,7 @@ def test_gps_without_a_velocity_is_in_the_ledger(held, read):
     log = read({"lat": latitude, "lon": longitude})
     entry = log.ledger["gps"]
     assert (entry.read, entry.used, entry.left_out) == (50, 0, {"without a velocity": 50})
-    assert log.instruments == ("gyro", "accelerometer")
+    assert log.sensors == ("gyro", "accelerometer")
     assert any("GPS without a velocity" in line for line in log.repairs)
 
 
@@ -183,13 +183,13 @@ def test_intervals_of_the_file_are_those_of_the_rows(held, read):
     np.testing.assert_allclose(read({"dt": jitter}).rows["dt_s"], jitter, rtol=0, atol=1e-12)
     other = read({"dt": np.full(held.n, 0.005)})
     np.testing.assert_allclose(other.rows["dt_s"], 0.02, rtol=0, atol=1e-9)
-    assert "intervals of 0.005 s are not those between the rows, 0.02 s: not used" in other.repairs
+    assert "intervals of 0.005 s do not fit the rows, which are 0.02 s apart: not used" in other.repairs
 
 
 def test_force_in_counts_is_refused_with_the_way_out(held, read):
     """2048 counts are a g: nobody can know that but the person."""
     counts = {f"a{a}": np.round(2048.0 / 9.80665 * held.force[:, i]) for i, a in enumerate("xyz")}
-    with pytest.raises(LogError, match=r"2048\.02 m/s\^2 is its median.*counts need a factor in a column map"):
+    with pytest.raises(LogError, match=r"its median is 2048\.02 m/s\^2.*counts need a factor in a column map"):
         read(counts)
 
 

@@ -80,7 +80,7 @@ def test_messages_of_ardupilot_become_the_rows_of_the_flight(tmp_path, matrices,
     expected["gps_t_s"][expected["gps_valid"] > 0] = np.nan
     expected["gps_valid"][logged.t_us >= matrices["GPS"][-1, 1]] = 0
     demand_same_rows(log.rows, expected, {"gps_p_e_m": 1e-5})
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     assert log.reference is not None
     np.testing.assert_allclose(log.reference.R_eb, logged.R_eb, rtol=0, atol=1e-9)
     assert log.known["gps_stamped"].value is False
@@ -192,7 +192,7 @@ def test_accelerometer_with_times_of_its_own_is_interpolated(tmp_path, held):
         (b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + b" " * 80, r"version 7\.3 \(HDF5\): save it again.*'-v7'"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), r"version 7\.3 \(HDF5\): save it again.*'-v7'"),
         ({"a": "words"}, r"no column of numbers; it has a \(str\)"),
-        ({"data": np.ones((9, 7))}, r'no column whose name is understood; it has data\[0\] to \[6\].*as "name\[0\]"'),
+        ({"data": np.ones((9, 7))}, r'no column name is recognised; it has data\[0\] to \[6\].*as "name\[0\]"'),
         ({"t": np.arange(9.0), "gyro": np.ones((9, 3))},
          r"no column for force\.x, .*; it has t, gyro\[0\] to \[2\]: name"),
         ({"t": np.arange(9.0), "g1": {"gyro": np.ones((9, 3))}, "g2": {"gyro": np.ones((9, 3))}},
@@ -220,7 +220,7 @@ def test_object_of_matlab_is_refused_with_what_to_save(tmp_path, monkeypatch):
     opaque = MatlabOpaque(np.zeros(1, dtype=[("s0", "O"), ("arr", "O")]))
     monkeypatch.setattr(matlab.sandbox, "call", lambda *_args, **_options: {"T": opaque})
     (tmp_path / "log.mat").write_bytes(b"MATLAB 5.0")
-    with pytest.raises(LogError, match=r"T holds objects of MATLAB.*table2struct\(T, 'ToScalar', true\)"):
+    with pytest.raises(LogError, match=r"T holds MATLAB objects.*table2struct\(T, 'ToScalar', true\)"):
         logs.read(tmp_path / "log.mat")
 
 
@@ -238,5 +238,5 @@ def test_second_unit_of_the_messages_is_chosen(tmp_path, matrices, logged):
     rows = logs.read(tmp_path / "log.mat", imu=1).rows
     np.testing.assert_allclose(rows["gyro_b_rad_s"], logged.rate + 0.3, rtol=0, atol=1e-12)
     savemat(tmp_path / "plain.mat", {"t": logged.t_us / 1e6, "gyro": logged.rate, "acc": logged.force})
-    with pytest.raises(LogError, match="is chosen among the messages of an autopilot, and these are none"):
+    with pytest.raises(LogError, match="chooses an inertial unit of an autopilot"):
         logs.read(tmp_path / "plain.mat", imu=1)

@@ -164,4 +164,4 @@ def test_row_of_units_says_the_unit_of_a_column():
     found, _ = automatic(["Time", "Wx"], {"Time": "ms", "Wx": "deg/s"})
     assert found["Time"].factor == pytest.approx(1e-3, rel=1e-15)
     assert found["Wx"].factor == pytest.approx(DEG, rel=1e-15)
-    assert found["Wx"].told
+    assert found["Wx"].unit_given

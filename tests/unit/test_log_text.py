@@ -63,7 +63,7 @@ def test_columns_become_rows(write):
     np.testing.assert_allclose(log.rows["force_b_m_s2"], FORCE, rtol=0, atol=1e-7)
     assert log.reference is not None
     np.testing.assert_allclose(log.reference.R_eb, R_EB, rtol=0, atol=1e-7)
-    assert (log.instruments, log.repairs) == (("gyro", "accelerometer", "gps"), ())
+    assert (log.sensors, log.repairs) == (("gyro", "accelerometer", "gps"), ())
 
 
 def test_fix_arrives_where_its_values_change(write):
@@ -136,7 +136,7 @@ def test_map_that_comes_with_the_package_fits_by_itself(tmp_path):
     savemat(tmp_path / "f.mat", {"flight_data": record})
     log = logs.read(tmp_path / "f.mat")
     np.testing.assert_allclose(log.rows["mag_b_ut"][-1], [100.0, -100.0, -100.0], rtol=1e-12)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
 
 
 def test_words_are_left_alone_in_columns_that_nobody_asked_for(write):
@@ -199,7 +199,7 @@ def test_missing_columns_are_refused_by_name(write):
 
 def test_cell_that_is_no_number_is_refused_with_line_and_column(write):
     """A word among numbers is named where it stands."""
-    with pytest.raises(LogError, match=r"log\.csv: line 41, column gy: 'oops' is no number"):
+    with pytest.raises(LogError, match=r"log\.csv: line 41, column gy: 'oops' is not a number"):
         write(changed(lines(table()), 41, cell=2, new="oops"))
 
 
@@ -263,7 +263,7 @@ def test_gaps_are_told(write):
     text = lines(table())
     log = write([*text[:100], *text[200:300], *text[303:]])
     assert log.repairs == (
-        "3 samples lost, the next stands for them; first at 6.06 s",
+        "3 samples lost, covered by the next one; first at 6.06 s",
         "1 gaps longer than 0.5 s, the longest 2.0 s until 4.00 s",
     )
 
@@ -293,7 +293,7 @@ def test_accelerometer_in_g_is_converted_and_the_wrong_way_round_refused(write):
     np.testing.assert_allclose(log.rows["force_b_m_s2"], FORCE, rtol=0, atol=1e-7)
     assert log.repairs == ("column ax ay az (force) in g, not m/s^2: converted",)
     level = np.tile([0.0, 0.0, 9.8], (N, 1))
-    with pytest.raises(LogError, match=r"column ax ay az \(force\): 9\.8 m/s\^2 is the median of z.*minus sign"):
+    with pytest.raises(LogError, match=r"column ax ay az \(force\): the median of z is 9\.8 m/s\^2.*minus sign"):
         write(lines(columns | {f"a{a}": level[:, i] for i, a in enumerate("xyz")}))
 
 
@@ -302,7 +302,7 @@ def test_accelerometer_in_g_is_converted_and_the_wrong_way_round_refused(write):
     [
         ({"az": np.full(N, np.nan)}, r"column az \(force\.z\): no number in 500 rows"),
         ({"gx": np.where(np.arange(N) < 300, np.nan, 0.1)}, "300 of 500 rows lack a number, the first is line 2"),
-        ({f"a{a}": np.full(N, 1e3) for a in "xyz"}, r"\(force\): 1732\.05 m/s\^2 is its median"),
+        ({f"a{a}": np.full(N, 1e3) for a in "xyz"}, r"\(force\): its median is 1732\.05 m/s\^2"),
         ({"t": 1e-6 * np.arange(N)}, "an inertial unit samples every 5e-05 to 0.5 s"),
     ],
 )
@@ -316,12 +316,12 @@ def test_log_that_cannot_be_believed_is_refused(write, columns, said):
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("log.csv", b"", "0 lines; a header and rows of numbers"),
+        ("log.csv", b"", "no row of numbers: a header and rows of numbers"),
         ("log.csv", b"t,gx,t\n1,2,3\n", "line 1: two columns are named 't'"),
         ("log.csv", b"\xff\xfe\x00", "cannot be read"),
         ("log.csv.gz", b"\x1f\x8b\x08\x00", "cannot be read"),
         ("log.mat", b"MATLAB 5.0", "cannot be read as a MATLAB file"),
-        ("log.xyz", b"", "unknown kind of log; a folder or .parquet is a recording"),
+        ("log.xyz", b"", "unknown kind of log; recordings are folders or .parquet"),
         ("log.parquet", b"PAR1", "cannot read"),
     ],
 )

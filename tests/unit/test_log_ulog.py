@@ -116,7 +116,7 @@ def test_log_is_read_as_it_was_written(logged, demand_same_rows, write):
     """Every column to the resolution of floats, every arrival in its tick, the simulator's attitude as truth."""
     log = write(ulog(messages(logged)))
     demand_same_rows(log.rows, expected_of(logged), RESOLUTION)
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
     assert log.repairs == ()
     assert log.place == pytest.approx((47.4, 8.5), rel=0, abs=1e-9)
     assert log.reference is not None
@@ -156,7 +156,7 @@ def test_log_of_2017_is_read_as_it_was_written(logged, demand_same_rows, write):
     log = write(ulog(told, topics))
     # The interval is a float of 0.02 s; 1e-7 degrees are 11 mm.
     demand_same_rows(log.rows, expected, RESOLUTION | {"dt_s": 2e-9, "gps_p_e_m": 0.02})
-    assert log.instruments == ("gyro", "accelerometer", "gps", "magnetometer")
+    assert log.sensors == ("gyro", "accelerometer", "gps", "magnetometer")
 
 
 def test_inertial_unit_is_chosen_by_its_number(logged, demand_same_rows, write):
@@ -183,8 +183,8 @@ def test_samples_that_were_not_logged_are_stood_for_by_the_next(logged, write):
     ]
     log = write(ulog(told))
     assert log.repairs == (
-        "sensor_combined: means over 5 ms logged every 20 ms; each stands for the time since the one before",
-        f"1 samples lost, the next stands for them; first at {logged.t_us[101] / 1e6:.2f} s",
+        "sensor_combined: means over 5 ms logged every 20 ms; each is taken for the time since the one before",
+        f"1 samples lost, covered by the next one; first at {logged.t_us[101] / 1e6:.2f} s",
     )
     assert log.rows["dt_s"][[0, 50, 100]].tolist() == pytest.approx([0.02, 0.02, 0.04], rel=0, abs=1e-9)
 
@@ -244,7 +244,7 @@ def test_end_that_was_cut_off_and_dropouts_are_told(logged, write):
     dropouts = [framed("O", struct.pack("<H", ms)) for ms in (120, 80)]
     log = write([records[0], *dropouts, *records[1:last], records[last][:30]])
     assert log.repairs == (
-        f"30 bytes that are no whole message left out, first at byte {sum(map(len, [*dropouts, *records[:last]]))}",
+        f"30 bytes outside complete messages left out, first at byte {sum(map(len, [*dropouts, *records[:last]]))}",
         "2 times the logger could not follow, for 0.20 s in all",
     )
     assert len(log.rows) == 999
@@ -256,7 +256,7 @@ def test_damaged_bytes_are_left_out_and_counted(logged, write):
     strange = framed("D", struct.pack("<H", 999) + bytes(20))
     log = write([*records[:500], b"\x40\x1fI", *records[500:800], strange, *records[800:]])
     first = sum(map(len, records[:500]))
-    assert log.repairs == (f"{3 + len(strange)} bytes that are no whole message left out, first at byte {first}",)
+    assert log.repairs == (f"{3 + len(strange)} bytes outside complete messages left out, first at byte {first}",)
     assert len(log.rows) == 1000
     np.testing.assert_allclose(log.rows["gyro_b_rad_s"], logged.rate, rtol=0, atol=1e-7)
 
@@ -269,7 +269,7 @@ def test_log_with_data_appended_after_a_crash_is_read_whole(logged, demand_same_
     before[0] = before[0].replace(framed("B", bytes(40)), framed("B", flags))
     log = write([*before, *records[3000:]])
     demand_same_rows(log.rows, expected_of(logged), RESOLUTION)
-    assert log.repairs == (f"12 bytes that are no whole message left out, first at byte {len(records[0])}",)
+    assert log.repairs == (f"12 bytes outside complete messages left out, first at byte {len(records[0])}",)
 
 
 def test_damaged_times_are_left_out_and_late_ones_sorted(logged, write):
@@ -368,7 +368,7 @@ def test_attitude_without_a_number_is_one_that_cannot_be_judged(logged, write):
     log = write(ulog(told))
     entry = log.ledger["reference"]
     assert (entry.read, entry.used, entry.left_out) == (len(logged.t_us), 0, {"no attitude": len(logged.t_us)})
-    said = f"vehicle_attitude_groundtruth in flight.ulg: none of it can be used, {len(logged.t_us)} no attitude"
+    said = f"vehicle_attitude_groundtruth in flight.ulg: no attitude can be used: {len(logged.t_us)} no attitude"
     assert why_none(log, Window()) == said
 
 

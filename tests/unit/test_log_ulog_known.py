@@ -115,8 +115,8 @@ def test_airspeed_that_px4_does_not_use_is_not_given(logged, known, name, value)
     log = known({name: value})
     assert log.ledger["airspeed"].left_out == {f"{name} is {value}": len(logged.air_us)}
     assert log.known["use_airspeed"] == Known(False, "log", name)
-    assert "airspeed" not in log.instruments
-    assert "airspeed" in known({"FW_ARSP_MODE": 0, "CBRK_AIRSPD_CHK": 0, "SYS_HAS_NUM_ASPD": 1}).instruments
+    assert "airspeed" not in log.sensors
+    assert "airspeed" in known({"FW_ARSP_MODE": 0, "CBRK_AIRSPD_CHK": 0, "SYS_HAS_NUM_ASPD": 1}).sensors
 
 
 @pytest.mark.parametrize(("name", "value"), [("SYS_HAS_MAG", 0), ("EKF2_MAG_TYPE", 5)])
@@ -125,7 +125,7 @@ def test_magnetometer_that_px4_does_not_use_is_not_given(logged, known, name, va
     log = known({name: value})
     assert log.ledger["magnetometer"].left_out == {f"{name} is {value}": len(logged.field_us)}
     assert log.known["use_magnetometer"] == Known(False, "log", name)
-    assert "magnetometer" in known({"SYS_HAS_MAG": 1, "EKF2_MAG_TYPE": 0}).instruments
+    assert "magnetometer" in known({"SYS_HAS_MAG": 1, "EKF2_MAG_TYPE": 0}).sensors
 
 
 def test_airspeed_that_nobody_measured_is_not_used(logged, known):
@@ -175,5 +175,5 @@ def test_magnetometer_and_barometer_of_2017_are_read(logged, px4, read_back):
     np.testing.assert_allclose(log.rows["baro_height_m"], above, rtol=0, atol=7e-5)
     for stream, n in (("magnetometer", len(logged.field_us)), ("barometer", len(logged.air_us))):
         assert (log.ledger[stream].read, log.ledger[stream].used) == (n, n)
-    assert log.instruments == ("gyro", "accelerometer", "magnetometer")
+    assert log.sensors == ("gyro", "accelerometer", "magnetometer")
     assert log.repairs == ()

@@ -72,7 +72,7 @@ def test_data_appended_after_a_crash_are_found_where_the_flags_say(logged, px4, 
     begin = sum(map(len, records[:-1])) + len(cut)
     records[0] = appended(records[0], [begin, begin + len(dump), begin + 2 * len(dump)])
     log = read_back([*records[:-1], cut, dump, dump, dump], "flight.ulg")
-    assert log.repairs == (f"9 bytes that are no whole message left out, first at byte {begin - len(cut)}",)
+    assert log.repairs == (f"9 bytes outside complete messages left out, first at byte {begin - len(cut)}",)
     assert len(log.rows) == 1000
 
 
@@ -87,7 +87,7 @@ def test_message_that_was_cut_off_by_a_crash_does_not_take_appended_data_for_its
     records[0] = appended(records[0], [begin])
     log = read_back([*records[:last], cut, text, *records[last + 1 :]], "flight.ulg")
     np.testing.assert_allclose(log.rows["gyro_b_rad_s"], logged.rate[:999], rtol=0, atol=1e-7)
-    assert log.repairs == (f"20 bytes that are no whole message left out, first at byte {begin - 20}",)
+    assert log.repairs == (f"20 bytes outside complete messages left out, first at byte {begin - 20}",)
 
 
 def test_flags_that_point_nowhere_do_no_harm(pieces, read_back):

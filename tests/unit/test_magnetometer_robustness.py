@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.blocks.magnetometer import FIELD_RANGE_UT, believable, turn_to_north
+from estimator.blocks.magnetometer import believable, turn_to_north
 from estimator.compiler.jit import kernel
 from estimator.dilshad import Dilshad
 from estimator.interface import MEASURED_DTYPE, Measurements
+from estimator.params.shared import FIELD_RANGE_UT
 from estimator.starlino import Starlino
 
 N = 400

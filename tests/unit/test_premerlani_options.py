@@ -238,11 +238,11 @@ def test_w_y_until_lock_finds_the_heading_sooner_and_is_gone_after():
     ("params", "message"),
     [
         ({"clip_m_s2": 9.8}, "clip_m_s2 is 9.8 m/s"),
-        ({"force_full_scale_m_s2": 9.8}, "force_full_scale_m_s2 is 9.8 m/s.2; gravity is felt"),
+        ({"force_full_scale_m_s2": 9.8}, "force_full_scale_m_s2 is 9.8 m/s.2; gravity alone"),
         ({"force_full_scale_m_s2": math.nan}, "force_full_scale_m_s2 is nan"),
         ({"clip_m_s2": math.nan}, "clip_m_s2 is nan"),
         ({"w_y_until_lock": -1.0}, "w_y_until_lock is -1.0"),
-        ({"learn_wind": True, "rotate_history": False}, "learn_wind is on and rotate_history off"),
+        ({"learn_wind": True, "rotate_history": False}, "learn_wind needs rotate_history"),
     ],
 )
 def test_params_of_an_option_that_cannot_be_are_refused(params, message):

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from autopilot.interface import NEUTRAL
-from estimator.blocks.magnetometer import Calibration, soft_iron_from_ellipsoid
+from estimator.blocks.calibration import Calibration, soft_iron_from_ellipsoid
 from sim import place
 from sim.clock import Rates
 from sim.log import Log

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator import starlino
-from estimator.blocks.magnetometer import Calibration
+from estimator.blocks.calibration import Calibration
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample
 from estimator.rotation import heading_rad, inclination_error_rad, rotation_error_rad
 from estimator.starlino import Starlino, StarlinoParams

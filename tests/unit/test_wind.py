@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from estimator.blocks import wind
+from estimator.blocks.compiled import BELIEF
 from estimator.interface import dtype_of
 
-STATE = dtype_of(wind.WIND_FILTER)
+STATE = dtype_of((*BELIEF, *wind.WIND_FILTER))
 
 
 @wind.kernel

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from autopilot.interface import NEUTRAL
-from estimator.blocks.magnetometer import Calibration
+from estimator.blocks.calibration import Calibration
 from estimator.interface import G_M_S2, Array, ImuSample
 from estimator.rotation import inclination_error_rad
 from sim import place

@@ -1,4 +1,4 @@
-"""`wingslevel replay`: a log, replayed with one or more estimators, recorded and reported."""
+"""`wingslevel replay`: reads a log, replays it with one or more estimators, records and prints the result."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,12 +30,12 @@ _SHOWN = (
 
 @dataclass(frozen=True, slots=True)
 class Replays:
-    """A log and the results of the estimators.
+    """A log and its replays by the estimators.
 
-    folders : their recordings, by name, None if one was not, or could not be, written
-    flights : each replay as a flight, by name; none for an estimator that ended its process
+    folders : recordings by estimator, None for one that was not, or could not be, written
+    flights : each replay as a flight, by estimator; none for one that ended its process
     not_judged : why nothing was judged, empty if something was
-    notes : what was set for some of the estimators alone, a line each
+    notes : parameters that only some of the estimators have, and the like, a line each
     """
 
     log: RecordedLog
@@ -48,18 +48,18 @@ class Replays:
 
     @property
     def exit_code(self) -> int:
-        """1 if an estimator failed, or nothing of the reference could be judged."""
+        """1 if an estimator failed, or if the log has a reference and none of it could be judged."""
         nothing = self.log.reference is not None and self.not_judged
         return 1 if nothing or any(r.failure for r in self.replays) else 0
 
     def to_json(self) -> dict[str, Any]:
-        """Every number by its estimator; with one estimator at the top too."""
+        """All numbers by estimator; with a single estimator also at the top."""
         rows = self.log.rows
         about = {
             "log": self.log.name,
             "rows": len(rows),
             "length_s": float(rows["t_s"][-1] - rows["t_s"][0] + rows["dt_s"][0]),
-            "instruments": list(self.log.instruments),
+            "sensors_in_log": list(self.log.sensors),
             "reference": self.log.reference.name if self.log.reference else None,
             "reference_kind": self.log.reference.kind if self.log.reference else None,
             "repairs": list(self.log.repairs),
@@ -90,16 +90,16 @@ def replay_log(
     """Read the log at `path`, replay it with each estimator of `names`, record each below the folder `into`.
 
     into : None records nothing
-    params : of all that have them, or, as ``premerlani.gps_latency_s``, of one
-    withheld : properties of the instruments that no estimator is given; ``all`` are all of them
+    params : for all estimators that have them, or, as ``premerlani.gps_latency_s``, for one
+    withheld : properties of the instruments to hide from the estimators; ``all`` hides all of them
 
     Raises
     ------
-    ValueError      one line: log, reference, map, estimator, parameter or folder; nothing has been written then
+    ValueError      one line: log, reference, map, estimator, parameter or folder; nothing has been written
     """
     window, params = window or Window(), params or {}
     if not names or len({name.rpartition(":")[2] for name in names}) < len(names):
-        raise ValueError(f"--estimator {','.join(names)}: name at least one, name each one once")
+        raise ValueError(f"--estimator {','.join(names)}: name one or more, each only once")
     settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
     of_each, withheld = shared_settings(names, settings), property_names(withheld)
     for name in names:
@@ -107,12 +107,12 @@ def replay_log(
     if into is not None:
         recording.check_writable(into)
     log = logs.read(path, reference=reference, columns=columns, imu=imu)
-    for name in names:  # again, with the properties in the log: all are made before any is run
+    for name in names:  # all are made with the properties of the log before any is run
         make(name, of_each[name], known_to(log, withheld))
     replays: list[Replayed] = []
     for name in names:
         watched = f"estimator {name}"
-        if watched in guard.lost:  # and with it the process in which all are replayed
+        if watched in guard.lost:  # it ended the process
             replays.append(gone(name, f"the process {guard.lost[watched].message}"))
             continue
         with console.progress(f"replaying {name}", "") as advance, guard.watched(watched):
@@ -138,18 +138,18 @@ def _place(folder: Path | None) -> str | None:
 
 
 def _ground_too(log: RecordedLog) -> list[str]:
-    """A note if no fix of the log is usable: flight and ground cannot be told apart then."""
+    """A line if the log has fixes but none is usable, so that ground and flight cannot be separated."""
     fixes = log.ledger.get("gps")
     if fixes is None or not fixes.read or fixes.used:
         return []
-    return ["none of the fixes is usable: all rows are judged, those on the ground too"]
+    return ["no fix is usable: all rows are judged, also those on the ground"]
 
 
 def print_report(replays: Replays) -> None:
-    """The log, what was repaired in it, the table, and where the recordings are."""
+    """Print the log, the repairs, the table of scores, and the folders of the recordings."""
     out, log = console.out(), replays.log
     length_s = log.rows["t_s"][-1] - log.rows["t_s"][0]
-    console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.instruments)}")
+    console.line(f"{log.name}: {len(log.rows)} rows, {length_s:.1f} s, {', '.join(log.sensors)}")
     for line in log.notes:
         console.line(f"note        {line}")
     for line in log.repairs:
@@ -178,7 +178,7 @@ def print_report(replays: Replays) -> None:
 
 
 def _books(log: RecordedLog) -> list[list[str]]:
-    """Lines of the ledger."""
+    """Rows of the ledger."""
     return [
         [stream, str(entry.read), str(entry.used), ", ".join(f"{n} {reason}" for reason, n in entry.left_out.items())]
         for stream, entry in log.ledger.items()
@@ -186,7 +186,7 @@ def _books(log: RecordedLog) -> list[list[str]]:
 
 
 def _row(replayed: Replayed) -> list[str]:
-    """A line of the table: numbers that belong together in one cell, so that it fits 80 columns."""
+    """A row of the table, with related numbers in one cell, so that it fits 80 columns."""
     cells = [" ".join(f"{console.number(replayed.scores[name]):>6}" for name in names) for names in _SHOWN]
     return [replayed.estimator, *cells, f"{replayed.ns_per_update:.0f}"]
 

@@ -1,4 +1,4 @@
-"""The air of a configuration: what people type for wind, gusts, turbulence and thermals, and what becomes of it.
+"""The air of a configuration: wind, gusts, turbulence and thermals, as typed and as flown.
 
 Directions are those that the air comes FROM, in degrees from north over east.
 """
@@ -30,7 +30,7 @@ class _Model(BaseModel):
 
 
 class GustConfig(_Model):
-    """A gust that swells and dies as 1 - cos.
+    """A gust with a 1 - cos profile.
 
     m_s : horizontal part at its peak, below 0 is a lull    up_m_s : vertical part, below 0 is a downdraft
     start_s : since the release                             length_s : from calm to calm
@@ -45,7 +45,7 @@ class GustConfig(_Model):
 
 
 class AirConfig(_Model):
-    """The mean wind at 10 m, and what rides on it.
+    """The mean wind at 10 m height, and shear, gusts, turbulence and thermals.
 
     wind_from_deg : "random" any direction; by the heading at the start "cross" from its left or right, "head", "tail"
     shear : exponent of the wind's growth with height, 0 none, 0.14 open country, see `sim.air.profile`
@@ -66,7 +66,7 @@ class AirConfig(_Model):
 
     @property
     def calm(self) -> bool:
-        """Whether nothing moves in it."""
+        """Whether the air is still."""
         return not (self.wind_m_s or self.gusts or self.turbulence_w20_m_s or self.thermals)
 
     @field_validator("gusts", mode="before")
@@ -88,19 +88,19 @@ class AirConfig(_Model):
         if isinstance(thermals, list | tuple) and len(thermals) <= MOST:
             return thermals
         if not re.fullmatch(r"[0-9]{1,6}", str(thermals).strip()) or int(thermals) > MOST:
-            raise ValueError(f"thermals = {thermals!r}: write how many, a whole number from 0 to {MOST}")
+            raise ValueError(f"thermals = {thermals!r}: write their number, a whole number from 0 to {MOST}")
         return int(thermals)
 
 
 class Wind(NamedTuple):
-    """Speed of the wind and where it comes from."""
+    """Speed of the wind, and the direction it comes from."""
 
     m_s: float
     from_deg: float | FromWord
 
 
 def parse_wind(text: str) -> Wind:
-    """Wind of what a person types: ``5@270`` is 5 m/s from the west.
+    """Parse a wind: ``5@270`` is 5 m/s from the west.
 
     Also ``5@random``, by the heading at the start ``5@cross`` (from its left or its right), ``5@head`` and ``5@tail``,
     and ``0`` or ``calm``.
@@ -128,7 +128,7 @@ def parse_wind(text: str) -> Wind:
 
 
 def parse_gust(text: str) -> GustConfig:
-    """Gust of what a person types: ``4@12s`` is 4 m/s more wind, 12 s after the release, over within 2 s.
+    """Parse a gust: ``4@12s`` is 4 m/s more wind, 12 s after the release, over within 2 s.
 
     ``4@12s/3s`` lasts 3 s; ``4@12s:up``, ``:down``, ``:across`` or ``:90`` (from the east) comes from elsewhere than
     the wind; ``-4@12s`` is a lull.
@@ -164,7 +164,7 @@ def parse_gust(text: str) -> GustConfig:
 
 
 def parse_turbulence(text: str) -> float:
-    """Wind at 20 ft [m/s] of a word of MIL-F-8785C or of a number, which is not checked here; else ValueError."""
+    """Parse turbulence: a word of MIL-F-8785C or the wind at 20 ft, m/s; the number is not checked here."""
     tidy = text.strip().lower()
     if tidy in SEVERITIES_M_S:
         return SEVERITIES_M_S[tidy]
@@ -176,7 +176,7 @@ def parse_turbulence(text: str) -> float:
 
 
 def resolve_air(air: AirConfig, heading_deg: float, seed: int, flight: int) -> AirConfig:
-    """`air` in plain numbers: directions and places that were left to chance are drawn, each from its own stream."""
+    """`air` in plain numbers: random directions and places are drawn, each from its own stream."""
     from_deg = air.wind_from_deg
     if isinstance(from_deg, str):
         draw = stream(seed, flight, "wind_direction").random()
@@ -194,7 +194,7 @@ def resolve_air(air: AirConfig, heading_deg: float, seed: int, flight: int) -> A
 
 
 def build_air(air: AirConfig) -> Air:
-    """The air of a resolved configuration; people type where the wind comes from, `Air` wants where it goes."""
+    """The air of a resolved configuration, which says where the wind comes from; `Air` takes where it goes."""
     if isinstance(air.wind_from_deg, str) or isinstance(air.thermals, int):
         raise ValueError(f"air.wind_from_deg = {air.wind_from_deg!r}: resolve the configuration first")
     return Air(

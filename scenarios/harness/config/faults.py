@@ -1,4 +1,4 @@
-"""The faults of a configuration: what people type for one, and what is refused."""
+"""The faults of a configuration: parsing and validation."""
 
 import math
 import re
@@ -16,7 +16,7 @@ _SHORT = {"accel": "accelerometer", "mag": "magnetometer", "baro": "barometer"}
 
 
 def parse_fault(text: str) -> Fault:
-    """Fault of what a person types: ``gyro.x:stuck@20-25``, ``gps:jump=50,-20@10``, see `sim.sensors.faults`.
+    """Parse a fault: ``gyro.x:stuck@20-25``, ``gps:jump=50,-20@10``, see `sim.sensors.faults`.
 
     Seconds count from the release, so that -3 is in the hand; without an end it lasts to the end of the flight.
 
@@ -39,7 +39,7 @@ def parse_fault(text: str) -> Fault:
     try:
         values = tuple(number(value) for value in found[3].split(",")) if found[3] is not None else ()
     except ValueError:
-        raise ValueError(f"fault = {text!r}: {found[3]!r} is no number; {_RIGHT}") from None
+        raise ValueError(f"fault = {text!r}: {found[3]!r} is not a number; {_RIGHT}") from None
     from_s, to_s = float(found[4]), float(found[6]) if found[6] else math.inf
     try:
         return Fault(channel, kind, values, from_s, to_s)
@@ -48,7 +48,7 @@ def parse_fault(text: str) -> Fault:
 
 
 def typed_faults(faults: Any) -> Any:
-    """Faults as a configuration keeps them: each the one text that says it in full; a text may hold several."""
+    """Faults as a configuration keeps them: each in its full spelling; a text may hold several."""
     listed = faults.split() if isinstance(faults, str) else faults
     if not isinstance(listed, list | tuple) or not all(isinstance(fault, str | Fault) for fault in listed):
         raise ValueError(f"faults = {faults!r}: {_RIGHT}")
@@ -60,7 +60,7 @@ def typed_faults(faults: Any) -> Any:
 
 
 def never_met(faults: Sequence[str], held_s: float, duration_s: float) -> list[str]:
-    """Those of `faults` that a flight of `duration_s` after `held_s` in the hand is over before, or begins after."""
+    """Those of `faults` that lie wholly outside a flight of `duration_s` after `held_s` in the hand."""
     return [text for text in faults if not _is_met(parse_fault(text), held_s, duration_s)]
 
 
@@ -69,6 +69,6 @@ def _is_met(fault: Fault, held_s: float, duration_s: float) -> bool:
 
 
 def require_faults_possible(faults: Sequence[str], suite: Any) -> None:
-    """Refuse a fault of a sensor that the parameters `suite` have not: ValueError."""
+    """ValueError for a fault of a sensor that `suite` does not have."""
     for fault in faults:
         require_possible(parse_fault(fault), suite)

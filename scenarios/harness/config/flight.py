@@ -1,7 +1,7 @@
 """The configuration of one flight: what flies, where from, through what air, with which sensors, for how long.
 
-A configuration may leave things to chance (``"random"``).  `resolve` draws them once, each from its named stream,
-into plain numbers; the resolved configuration goes into the manifest, and the flight can be flown again from it.
+A configuration may leave values to chance (``"random"``).  `resolve` draws each of them once, from its named stream.
+The resolved configuration goes into the manifest, from which the flight can be repeated.
 """
 
 import json
@@ -29,11 +29,11 @@ from sim.sensors.fitting import SuiteParams, own_files, suite_params
 
 MOST_BYTES = 2_000_000_000  # of a flight's log, which is held in memory
 ROW_BYTES = sum(dtype.itemsize for dtype in (TRUTH_DTYPE, MEASURED_DTYPE, FLOWN_DTYPE))
-SMALLEST, LARGEST = 1e-12, 1e9  # of a number that is no zero, in whatever unit
+SMALLEST, LARGEST = 1e-12, 1e9  # size of a non-zero number, in any unit
 
 Chance = Literal["random"]
 Triple = tuple[float, float, float]
-Figure = float | bool | str | tuple[float, ...]  # what a field of a sensor can be; the dataclass says which
+Figure = float | bool | str | tuple[float, ...]  # type of a sensor field; the dataclass says which
 
 
 class _Model(BaseModel):
@@ -59,7 +59,7 @@ class RatesConfig(_Model):
         return self
 
     def build(self) -> Rates:
-        """The clock of these rates; ValueError where that of the GPS is still the receiver's own."""
+        """The clock of these rates; ValueError if the GPS rate is still the receiver's own."""
         if self.gps_hz is None:
             raise ValueError("rates.gps_hz = None: resolve the configuration first")
         return Rates(self.physics_hz, self.imu_hz, self.gps_hz)
@@ -76,7 +76,7 @@ class InFlightStart(_Model):
 
 
 class HandMotion(_Model):
-    """How the hand moved: a_i sin(2 pi f_i t + phase_i) in rate about roll, pitch and yaw, and the twist it gave."""
+    """Motion of the hand: rates a_i sin(2 pi f_i t + phase_i) about each axis, and the twist at the release."""
 
     sway_deg_s: Triple
     sway_hz: Triple
@@ -85,9 +85,9 @@ class HandMotion(_Model):
 
 
 class HandThrowStart(_Model):
-    """Start in a hand at the launch point, then thrown.
+    """Start in the hand at the launch point, then a throw.
 
-    height_m : of the hand above the ground that is flown over: more than an arm's is a throw off a slope
+    height_m : of the hand above the ground; above arm's length it is a throw off a slope
     sway_deg_s : largest rate of the hand about each axis     release_rate_deg_s : sigma of the twist, each axis
     hand : "random" draws the motion from these two; a resolved configuration holds what was drawn
     calibration_s : from power-up, over which the gyro offset is measured in the hand
@@ -115,10 +115,10 @@ class HandThrowStart(_Model):
 
 
 class BenchStart(_Model):
-    """At rest on a table indoors, and it stays there: no air moves, no motor runs, no command does anything.
+    """At rest on a table indoors for the whole flight: still air, no motor, no controls.
 
-    height_m : of the table     calibration_s : from power-up, over which the gyro offset is measured; what is judged
-    begins after it
+    height_m : of the table     calibration_s : from power-up, over which the gyro offset is measured; judging
+    starts after it
     """
 
     kind: Literal["bench"] = "bench"
@@ -133,22 +133,22 @@ AnyStart = InFlightStart | HandThrowStart | BenchStart
 
 
 class FlightConfig(_Model):
-    """Everything that decides a flight, beside the code.
+    """Everything that decides a flight, apart from the code.
 
     estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
     estimator_params : fields of the estimator's parameter dataclass
-    instruments : properties of the instruments that the user sets, ``{"gps_latency_s": 1.0}``: they go to every
-    estimator and autopilot that has a parameter of that name, instead of the figures of the suite
-    withheld : names of properties to hide from flight code, whatever the suite says
+    instruments : properties of the instruments set by the user, ``{"gps_latency_s": 1.0}``: every estimator and
+    autopilot with a parameter of that name gets them instead of the figures of the suite
+    withheld : names of properties to hide from flight code
     duration_s : after the release          suite, sensors : name of the suite or ``path/to/suite.toml``, and fields
     changed in it by their dotted names, ``{"gps.latency_s": 1.0}``
-    turn_table : the magnetometer was turned on a table before the flight: an estimator that has a parameter
-    ``calibration`` is given what that tells, see `compass`
-    files : path -> text of the files of one's own that the suite is made of; a resolved configuration holds them
+    turn_table : the magnetometer was turned on a table before the flight: an estimator with a parameter
+    ``calibration`` is given the result, see `aboard`
+    files : path -> text of the user's own sensor files; a resolved configuration holds them
     manoeuvre : the scenario's own parameters
     faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
-    box_radius_m, box_height_m : of the cylinder around the launch point; beyond it the flight is over
-    seed, flight : campaign and number of the flight in it, which name the random streams
+    box_radius_m, box_height_m : of the cylinder around the launch point; the flight ends when it is left
+    seed, flight : campaign, and number of the flight in it: they name the random streams
     """
 
     aircraft: str = "endurance"
@@ -190,7 +190,9 @@ class FlightConfig(_Model):
     @model_validator(mode="after")
     def _calm_indoors(self) -> "FlightConfig":
         if isinstance(self.start, BenchStart) and not self.air.calm:
-            raise ValueError("air: it rests on a table indoors, where no air moves; leave wind, gusts and the rest out")
+            raise ValueError(
+                "air: the flight is on a table indoors, in still air; leave out wind, gusts, turbulence and thermals"
+            )
         return self
 
     @model_validator(mode="after")
@@ -202,13 +204,13 @@ class FlightConfig(_Model):
         if self.duration_s > most_s:
             raise ValueError(
                 f"duration_s = {self.duration_s:g} s: must be at most {max(most_s, 0.0):.0f} s at {self.rates.imu_hz} "
-                f"Hz, for the log is held in memory and may take {MOST_BYTES / 1e9:g} GB"
+                f"Hz: the log is held in memory and may take {MOST_BYTES / 1e9:g} GB"
             )
         return self
 
     @property
     def heading_deg(self) -> float:
-        """Heading at the start; ValueError where it has not been drawn yet."""
+        """Heading at the start; ValueError if it has not been drawn yet."""
         heading_deg = self.start.heading_deg
         if isinstance(heading_deg, str):
             raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
@@ -216,7 +218,7 @@ class FlightConfig(_Model):
 
     @property
     def held_s(self) -> float:
-        """From power-up to the release; on a table, to the end of the calibration."""
+        """Time from power-up to the release; on a table, to the end of the calibration."""
         match self.start:
             case HandThrowStart(hold_s=hold_s, push_s=push_s):
                 return hold_s + push_s
@@ -226,7 +228,7 @@ class FlightConfig(_Model):
 
     @property
     def calibration_s(self) -> float:
-        """From power-up, over which the gyro offset is measured; 0 where the flight starts in the air."""
+        """Time from power-up over which the gyro offset is measured; 0 for a start in the air."""
         return 0.0 if isinstance(self.start, InFlightStart) else self.start.calibration_s
 
 
@@ -244,7 +246,7 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
 
 
 def overridden(config: FlightConfig, overrides: Mapping[str, Any]) -> tuple[FlightConfig, SuiteParams]:
-    """What `override` gives, and the figures of the suite that is then carried."""
+    """The result of `override`, and the figures of its suite."""
     data = config.model_dump()
     if "suite" in overrides:  # first, for its fields are named by other overrides; its files are read anew
         data |= {"suite": str(overrides["suite"]), "files": {}}
@@ -275,7 +277,7 @@ _TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "
 
 
 def _full_name(name: str, config: FlightConfig, fitted: SuiteParams) -> str:
-    """Dotted name of a field that exists, or a ValueError with those that come near; `fitted` is its suite."""
+    """Full dotted name of a field, or a ValueError with suggestions; `fitted` is the suite."""
     fields = dotted_fields(fitted)
     if name in fields:
         return f"sensors.{name}"
@@ -291,7 +293,7 @@ def _full_name(name: str, config: FlightConfig, fitted: SuiteParams) -> str:
 
 
 def _dotted(config: FlightConfig) -> list[str]:
-    """Names of the fields that one may change."""
+    """Names of the fields that can be changed."""
     names: list[str] = []
     for name, value in config:
         if isinstance(value, BaseModel):
@@ -304,13 +306,13 @@ def _dotted(config: FlightConfig) -> list[str]:
 
 
 def _refuse_odd(name: str, value: Any) -> None:
-    """Refuse text that only Python takes for a number, but where a text is meant: ValueError."""
+    """ValueError for text that only Python reads as a number, unless the field is a text."""
     if isinstance(value, str) and name not in _TEXTS and is_odd(value):
         raise ValueError(f"{name} = {printable(value, 60)} {unit_of(name)}".rstrip() + f": {RIGHT}")
 
 
 def _put(data: dict[str, Any], name: str, value: Any) -> None:
-    """Set the field of dotted `name`; what follows ``sensors.`` is one key."""
+    """Set the field of dotted `name`; the rest after ``sensors.`` is one key."""
     head, _, rest = name.partition(".")
     if not rest:
         data[head] = value
@@ -324,10 +326,10 @@ def _put(data: dict[str, Any], name: str, value: Any) -> None:
 
 
 def literal(value: Any) -> Any:
-    """Number, truth value or list that `value` spells, else the text itself."""
+    """The number, boolean or list that `value` spells, else the text itself."""
     if not isinstance(value, str):
         return value
-    for read in (json.loads, number):  # .5 is a number, but no JSON
+    for read in (json.loads, number):  # .5 is a number, but not JSON
         try:
             return read(value)
         except (ValueError, RecursionError):
@@ -336,14 +338,14 @@ def literal(value: Any) -> Any:
 
 
 def _is_sane(value: Any) -> bool:
-    """Whether all numbers in it are of a size that some quantity could have: NaN and infinity are not."""
+    """Whether all numbers in it have a plausible size; NaN and infinity do not."""
     if isinstance(value, list | tuple):
         return all(map(_is_sane, value))
     return not isinstance(value, int | float) or value == 0 or SMALLEST <= abs(value) <= LARGEST
 
 
 def resolve(config: FlightConfig, suite: SuiteParams | None = None) -> FlightConfig:
-    """`config` with all that was left open in numbers: chance drawn, each from its named stream; idempotent.
+    """`config` in plain numbers: random values drawn, each from its named stream; idempotent.
 
     The rate of the GPS becomes the receiver's own, and the text of the user's own sensor files is kept.
 
@@ -377,7 +379,7 @@ def _resolve_start(config: FlightConfig) -> Any:
 
 
 def _draw_hand(config: FlightConfig, start: HandThrowStart) -> HandMotion:
-    """The hand sways as slowly as an arm does, 0.4 to 1.2 Hz; the twist is normal, cut off at two sigma."""
+    """The hand sways at 0.4 to 1.2 Hz, as an arm does; the twist is normal, truncated at two sigma."""
     rng = stream(config.seed, config.flight, "hand")
     sway = start.sway_deg_s * rng.uniform(0.5, 1.0, 3)
     hz, phase = rng.uniform(0.4, 1.2, 3), rng.uniform(0.0, 360.0, 3)

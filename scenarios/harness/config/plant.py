@@ -1,4 +1,4 @@
-"""What flies under a configuration: the aeroplane in its air, or what lies on a table."""
+"""The plant of a configuration: the aeroplane in its air, or the instruments on a table."""
 
 import math
 
@@ -32,7 +32,7 @@ def build_start(config: FlightConfig) -> Start:
     """Start of the aeroplane of a resolved configuration; ValueError if it never flies, or is not resolved."""
     start, heading_rad = config.start, math.radians(config.heading_deg)
     if isinstance(start, BenchStart):
-        raise ValueError("start: on a table nothing starts to fly")
+        raise ValueError("start: a flight on a table has no start in the air")
     if not isinstance(start, HandThrowStart):
         north_m, east_m = start.out_m * math.cos(heading_rad), start.out_m * math.sin(heading_rad)
         return InFlight(heading_rad, start.height_m, north_m, east_m, start.airspeed_m_s)

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong, in one line: the field, its value, the unit, and what would be right."""
+"""Validation errors of pydantic in one line: the field, its value, the unit, and what would be right."""
 
 from collections.abc import Mapping
 from typing import Any, TypeVar
@@ -6,32 +6,24 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from sim.outside.wording import brief, printable
+from sim.params import unit_of
 
 _M = TypeVar("_M", bound=BaseModel)
 
 
 def validated(model: type[_M], data: Mapping[str, Any]) -> _M:
-    """`model` of `data`; ValueError of one line where it does not fit."""
+    """`model` of `data`; a one-line ValueError if it does not fit."""
     try:
         return model.model_validate(data)
     except ValidationError as error:
         raise ValueError(_one_line(error)) from None
 
 
-_UNITS = (
-    ("_m_s2", "m/s2"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_deg", "deg"), ("_hz", "Hz"),
-    ("_m", "m"), ("_g", "g"), ("_s", "s"),
-)  # fmt: skip
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "at least"),
            "less_than": ("lt", "below"), "less_than_equal": ("le", "at most")}  # fmt: skip
 _WHOLE = ("int_parsing", "int_type", "int_from_float")
-# Branches of unions that pydantic puts into the place of an error; they are no part of a field's name.
+# Branches of unions that pydantic adds to the place of an error; they are not part of a field's name.
 _BRANCHES = ("in_flight", "hand_throw", "bench", "float", "constrained-float", "HandMotion")
-
-
-def unit_of(name: str) -> str:
-    """Unit that the end of a field's name says, empty where it says none."""
-    return next((unit for end, unit in _UNITS if name.endswith(end)), "")
 
 
 def _one_line(error: ValidationError) -> str:
@@ -59,7 +51,7 @@ def _one_line(error: ValidationError) -> str:
 
 
 def _shown(value: Any) -> str:
-    """`value` as it was typed, in quotes where it is no number."""
+    """`value` as typed, in quotes unless it is a number."""
     try:
         float(value)
     except (TypeError, ValueError, OverflowError):

@@ -1,8 +1,7 @@
-"""Recorded logs from anywhere, read into the rows that estimators take.
+"""Recorded logs of several formats, read into the rows that estimators take.
 
-One module per format; each has ``read(path, ...) -> RecordedLog``.  `read` picks the module by the file.  It is also
-the border to files of strangers: whatever a reader raises becomes a `LogError` of one line here, see
-`sim.outside.files`.
+One module per format; each has ``read(path, ...) -> RecordedLog``.  `read` chooses the module by the file name.  Files
+are not trusted: whatever a reader raises becomes a `LogError` of one line here, see `sim.outside.files`.
 """
 
 from dataclasses import replace
@@ -11,38 +10,38 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.harness.logs import accounts, checks, column_map, foreign
+from scenarios.harness.logs import checks, column_map, foreign
 from scenarios.harness.logs import reference as vectors
-from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog
+from scenarios.harness.logs.recorded import Kind, LogError, NothingToScore, RecordedLog
 from sim.outside import files
 from sim.outside.wording import printable
 
-_BY_MAP = {  # columns of numbers, which a column map explains
+_BY_MAP = {  # columns of numbers, described by a column map
     **dict.fromkeys((".csv", ".csv.gz", ".txt", ".txt.gz", ".tsv", ".tsv.gz"), "text"),
     ".mat": "matlab",
 }
-_OF_AUTOPILOTS = {".bin": "dataflash", ".ulg": "ulog"}  # messages that say what they hold, of several inertial units
+_OF_AUTOPILOTS = {".bin": "dataflash", ".ulg": "ulog"}  # self-describing messages, possibly of several inertial units
 KINDS = (
-    "a folder or .parquet is a recording of ours, *_in.csv.gz reference vectors, .csv .txt .tsv (.gz) and .mat hold "
-    "columns, .bin is ArduPilot's, .ulg PX4's"
+    "recordings are folders or .parquet, reference vectors *_in.csv.gz, columns .csv .txt .tsv (.gz) or .mat, logs of "
+    "ArduPilot .bin, logs of PX4 .ulg"
 )
 
 
 def read(
     path: Path, *, reference: Path | None = None, columns: str | None = None, imu: int | None = None
 ) -> RecordedLog:
-    """The log at `path`, put in order and checked, by the reader that its name asks for.
+    """The log at `path`, put in order and checked; its name selects the reader.
 
     Parameters
     ----------
-    reference : attitudes to score against, in a file of their own; for reference vectors one of the same set, for
-                others any log with an attitude, or a table of times on the same clock and attitudes
+    reference : a separate file with the attitudes to score against: for reference vectors one of the same set, for
+                others any log with an attitude, or a table of attitudes with times on the same clock
     columns : column map of a text or MATLAB file, see `column_map`
     imu : which inertial unit of an autopilot's log, from 0; by default the first one
 
     Raises
     ------
-    LogError      one line: a file that is not there, of an unknown kind, or that cannot be believed
+    LogError      one line: a file that is missing, of an unknown kind, or implausible
     """
     with files.reading(path, LogError):
         _check(path, "log")
@@ -59,13 +58,13 @@ def read(
 
 
 def _check(path: Path, what: str) -> None:
-    """Refuse what is neither a file nor a folder; LogError."""
+    """LogError if `path` is neither a file nor a folder."""
     if not path.is_dir():
         files.check(path, what)
 
 
 def _printable(log: RecordedLog) -> RecordedLog:
-    """`log` with what it says in words of the file, its name and those of its columns, fit for a terminal."""
+    """`log` with all text from the file made safe for a terminal."""
     reference = log.reference and replace(log.reference, name=printable(log.reference.name))
     repairs, notes = (
         tuple(printable(line, files.LONGEST_LINE) for line in lines) for lines in (log.repairs, log.notes)
@@ -74,12 +73,12 @@ def _printable(log: RecordedLog) -> RecordedLog:
 
 
 def _against(log: RecordedLog, path: Path) -> RecordedLog:
-    """`log` with the attitudes of the file at `path` at the times of its rows."""
+    """`log` with the attitudes from the file at `path`, at the times of its rows."""
     from scenarios.harness.logs import reference_file
 
-    rows_s, ledger, repairs = log.rows["t_s"], accounts.without(log.ledger, "reference"), list(log.repairs)
+    rows_s, ledger, repairs = log.rows["t_s"], log.ledger.without("reference"), list(log.repairs)
     reader = _module(path.name.lower(), _BY_MAP)
-    kind: reference_file.Kind = "filter"
+    kind: Kind = "filter"
     try:
         if reader and not vectors.is_reference(path):
             groups, source, notes = import_module(f"{__name__}.{reader}").groups(path)
@@ -91,7 +90,7 @@ def _against(log: RecordedLog, path: Path) -> RecordedLog:
             R_eb, kind = reference_file.of_log(path, other, rows_s, ledger)
         found = reference_file.reference(R_eb, kind, path)
     except NothingToScore as nothing:
-        ledger = accounts.without(log.ledger, "reference")
+        ledger = log.ledger.without("reference")
         ledger.read("reference", nothing.read)
         ledger.leave_out("reference", nothing.read, nothing.reason)
         unknown = np.full((len(rows_s), 3, 3), np.nan)
@@ -105,7 +104,7 @@ def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) ->
     if meanings is not None and not by_map:
         raise LogError(f"{path}: a column map is for text and MATLAB files")
     if imu is not None and not autopilot and by_map != "matlab":
-        raise LogError(f"{path}: an inertial unit is chosen in logs of autopilots (.bin, .ulg, their .mat)")
+        raise LogError(f"{path}: --imu is for logs of autopilots (.bin, .ulg, and .mat made from them)")
     if by_map == "matlab":
         return import_module(f"{__name__}.{by_map}").read(path, meanings, imu)
     if by_map:
@@ -119,5 +118,5 @@ def _read(path: Path, meanings: column_map.ColumnMap | None, imu: int | None) ->
 
 
 def _module(name: str, endings: dict[str, str]) -> str:
-    """The reader of a file of that name, empty where none of the endings is its."""
+    """The reader for a file name, empty if it has none of the `endings`."""
     return next((module for ending, module in endings.items() if name.endswith(ending)), "")

@@ -1,4 +1,4 @@
-"""The ledger's entries for what readers of tables do: why a row or a sample did not reach the estimators."""
+"""Ledger entries of the readers of tables: why a row or a sample did not reach the estimators."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -25,7 +25,7 @@ NO_VELOCITY = "without a velocity"
 def inertial(
     ledger: Ledger, t_s: Array, numbers: Array, keep: NDArray[np.intp], read: NDArray[np.intp] | None = None
 ) -> None:
-    """Account for the rows of an inertial unit of which those with the indices `keep` are used.
+    """Count the rows of an inertial unit; those with the indices `keep` are used.
 
     t_s : shape (N,), as read        numbers : shape (N, 6), gyro and accelerometer
     read : indices of its rows, all of them by default
@@ -49,13 +49,13 @@ def inertial(
 def samples(ledger: Ledger, stream: str, read: NDArray[np.bool_], reasons: Iterable[tuple[NDArray[np.bool_], str]]) -> (
     NDArray[np.bool_]
 ):  # fmt: skip
-    """Account for samples of a `stream` that are left out; of several reasons the first one counts.
+    """Count samples of a `stream` that are left out, each under the first of the `reasons` that applies.
 
     read : shape (N,), where samples are        reasons : where not to use them, and why
 
     Returns
     -------
-    shape (N,), those that remain; they are not yet counted as used
+    shape (N,), the samples that remain, not yet counted as used
     """
     good = read.copy()
     ledger.read(stream, int(read.sum()))
@@ -66,12 +66,12 @@ def samples(ledger: Ledger, stream: str, read: NDArray[np.bool_], reasons: Itera
 
 
 def arrivals(ledger: Ledger, read: NDArray[Any], used: NDArray[Any]) -> None:
-    """Account for what arrived in measured rows, as they were `read` and as they are `used`, in order of time.
+    """Count the samples in measured rows, as they were `read` and as they are `used`, in order of time.
 
-    What arrived in a row that was left out arrives with the next.  Streams that are in the `ledger` have been read,
-    and what a reader left out is in it.
+    A sample in a row that was left out arrives with the next row.  For streams in the `ledger`, it holds what was read
+    and what the reader left out.
     """
-    at = np.searchsorted(used["t_s"], read["t_s"])  # what has no time comes after all
+    at = np.searchsorted(used["t_s"], read["t_s"])  # rows without a time come last
     final = _arrived(used)
     for stream, there in _arrived(read).items():
         if stream not in ledger:
@@ -90,7 +90,7 @@ def arrivals(ledger: Ledger, read: NDArray[Any], used: NDArray[Any]) -> None:
 
 
 def _arrived(rows: NDArray[Any]) -> dict[str, NDArray[np.bool_]]:
-    """In which of the measured rows something arrived, by stream; air data by the numbers that they hold."""
+    """Rows in which a sample arrived, by stream; for air data, rows that hold the number."""
     air = rows["air_new"] > 0
     height = np.isfinite(rows["baro_height_m"])
     return {
@@ -102,21 +102,8 @@ def _arrived(rows: NDArray[Any]) -> dict[str, NDArray[np.bool_]]:
 
 
 def reference(ledger: Ledger, known: NDArray[np.bool_], used: int) -> None:
-    """Account for attitudes row by row, of which `used` are those of rows that are used."""
+    """Count reference attitudes row by row; `used` of them are in rows that are used."""
     if "reference" not in ledger:
         ledger.read("reference", int(known.sum()))
     ledger.leave_out("reference", int(known.sum()) - used, IN_ROW_LEFT_OUT)
     ledger.use("reference", used)
-
-
-def without(ledger: Ledger, stream: str) -> Ledger:
-    """A copy of the books without those of one stream."""
-    copy = Ledger()
-    for name, entry in ledger.items():
-        if name == stream:
-            continue
-        copy.read(name, entry.read)
-        copy.use(name, entry.used)
-        for reason, n in entry.left_out.items():
-            copy.leave_out(name, n, reason)
-    return copy

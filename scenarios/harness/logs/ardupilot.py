@@ -1,12 +1,12 @@
-"""What the parameters in a log of ArduPilot say of the instruments aboard.
+"""What the parameters in an ArduPilot log say about the instruments.
 
-Parameters are logged when the log begins and again where they change.  Those count that held when the aeroplane first
-flew; of a log without flight the last ones.  Where a parameter is not in the log, the firmware's default holds, and
-the origin says so.  SIM_ parameters, which configure a simulator, are not read.
+Parameters are logged at the start and whenever they change.  The values at the time of the first flight count; in a log
+without flight, the last ones.  If a parameter is not in the log, the firmware's default is used, and the source says
+so.  SIM_ parameters, which configure a simulator, are not read.
 
 | parameter | what it means here |
 |-|-|
-| COMPASS_AUTODEC (1 by default), COMPASS_DEC | declination by the world magnetic model at the first fix, else set |
+| COMPASS_AUTODEC (1 by default), COMPASS_DEC | declination by the world magnetic model at the first fix, or as set |
 | COMPASS_USE, _USE2, _USE3, COMPASS_ENABLE | whether a compass is used at all, and which |
 | GPS1_DELAY_MS, GPS_DELAY_MS (first), GPS2_DELAY_MS, GPS_DELAY_MS2 | latency; 0 is the driver's default, unknown here |
 | ARSPD_USE, ARSPD2_USE | 0 is not used, 2 is used at zero throttle only |
@@ -42,14 +42,14 @@ _ANY_VEHICLE = ((7, "IMU"), (19, "raw IMU"))
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """Parameters by name as they were in flight, and the vehicle's name, empty where the log has none."""
+    """Parameters by name as they were in flight, and the vehicle's name, empty if the log has none."""
 
     values: Mapping[str, float] = field(default_factory=dict)
     vehicle: str = ""
 
     @classmethod
     def of(cls, log: DataFlash | MatlabMessages) -> "Parameters":
-        """Those of a log."""
+        """The parameters of a log."""
         changes = log.records("PARM")
         if not {"Name", "Value"} <= set(changes.columns):
             return cls(vehicle=_vehicle(log))
@@ -66,7 +66,7 @@ class Parameters:
         return next(((name, self.values[name]) for name in names if name in self.values), None)
 
     def compass_off(self, instance: int) -> str:
-        """Why a compass is not used, in the words of its parameter; empty where it is."""
+        """The parameter that switches a compass off, with its value; empty if it is in use."""
         enable = self.first("COMPASS_ENABLE")
         use = self.first("COMPASS_USE" if instance == 0 else f"COMPASS_USE{instance + 1}")
         for found in (enable, use):
@@ -75,21 +75,21 @@ class Parameters:
         return ""
 
     def airspeed_off(self, instance: int) -> str:
-        """Why an airspeed sensor is not used, or not always, in the words of its parameter; empty where it is."""
+        """The parameter that switches an airspeed sensor off, fully or in part; empty if it is in use."""
         found = self.first("ARSPD_USE" if instance == 0 else f"ARSPD{instance + 1}_USE")
         if found is None or found[1] not in (0.0, 2.0):
             return ""
         return f"{found[0]} is 0" if found[1] == 0.0 else f"{found[0]} is 2: used at zero throttle only"
 
     def latency(self, instance: int) -> Known | None:
-        """The latency of a receiver, where it is set."""
+        """The latency of a receiver, if it is set."""
         i = instance + 1
         found = self.first(f"GPS{i}_DELAY_MS", "GPS_DELAY_MS" if i == 1 else f"GPS_DELAY_MS{i}")
         believed = found is not None and 0.0 < found[1] <= LONGEST_DELAY_MS
         return Known(1e-3 * found[1], "log", found[0]) if found is not None and believed else None
 
     def declination(self, place: tuple[float, float, float] | None, year: float) -> Known | None:
-        """The declination as the firmware finds it.
+        """The declination as the firmware determines it.
 
         place : of the first fix: latitude and longitude, degrees, and altitude, or None      year : NaN if unknown
         """
@@ -100,13 +100,13 @@ class Parameters:
             if set_rad is None:
                 return Known(0.0, "log", "COMPASS_AUTODEC is 0, COMPASS_DEC is not logged: 0 by default")
             return Known(set_rad[1], "log", "COMPASS_DEC")
-        if place is None:  # the firmware goes on with what it found before
+        if place is None:  # the firmware keeps the last one
             return None if set_rad is None else Known(set_rad[1], "log", "COMPASS_DEC, without a fix")
         why = "COMPASS_AUTODEC is 1" + (" by default" if automatic is None else "")
         return world_model(place, year, why)
 
     def log_imu(self) -> str:
-        """How to have the inertial unit logged."""
+        """How to log the inertial unit."""
         bits = _IMU_BITS.get(self.vehicle, _ANY_VEHICLE)
         listed = " or ".join(f"bit {bit} ({name})" for bit, name in bits)
         mask = self.first("LOG_BITMASK")
@@ -115,14 +115,14 @@ class Parameters:
 
 
 def world_model(place: tuple[float, float, float], year: float, why: str) -> Known:
-    """Declination by the world magnetic model; `year` is NaN where the log has no date, `why` what demands it."""
+    """Declination by the world magnetic model; `year` is NaN if the log has no date, `why` is the parameter."""
     dated = f"{year:.1f}" if np.isfinite(year) else f"{FIRST_YEAR:.0f} assumed, as the log has no date"
     value = declination_rad(*place, year if np.isfinite(year) else FIRST_YEAR)
     return Known(value, "log", f"world magnetic model at the first fix, {dated}; {why}")
 
 
 def year_of(fixes: Records) -> float:
-    """Decimal year of these GPS messages, by the week of GPS time; NaN where none has a date."""
+    """Decimal year of these GPS messages, by the week of GPS time; NaN if none has a date."""
     week = next((name for name in ("GWk", "Week") if name in fixes.columns), None)
     if week is None:
         return float("nan")
@@ -140,7 +140,7 @@ def _first_flight(log: DataFlash | MatlabMessages) -> int:
 
 
 def _vehicle(log: DataFlash | MatlabMessages) -> str:
-    """The name of the firmware, as it announces itself."""
+    """The vehicle type, from the firmware's start message."""
     messages = log.records("MSG")
     if "Message" not in messages.columns:
         return ""

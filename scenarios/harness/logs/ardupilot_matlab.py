@@ -1,9 +1,8 @@
-"""ArduPilot's logs as MATLAB files: the messages of a DataFlash log by their names, read as such by `dataflash`.
+"""ArduPilot logs converted to MATLAB files: the messages of a DataFlash log by name, read by `dataflash`.
 
-A message is a matrix ``IMU`` with its ``IMU_label``, as Mission Planner writes it, or a structure ``IMU`` of vectors,
-as pymavlink's mavlogdump does.  ``LineNo`` is the place of a message in the log that the file was made from.
-
-Units are those that the messages have of old: degrees, milligauss, rad/s.
+A message is a matrix ``IMU`` with ``IMU_label``, as Mission Planner writes it, or a structure ``IMU`` of vectors, as
+pymavlink's mavlogdump writes it.  ``LineNo`` is the place of a message in the original log.  Units are ArduPilot's own:
+degrees, milligauss, rad/s.
 """
 
 from collections.abc import Mapping
@@ -36,12 +35,11 @@ class MatlabMessages:
             self._records["PARM"] = parameters
 
     def records(self, name: str) -> Records:
-        """All records of that name; none where there are none."""
-        nothing = Records(name, 0, np.zeros(0, np.dtype([])), np.zeros(0, np.intp))
-        return self._records.get(name, nothing)
+        """All records of that name."""
+        return self._records.get(name, Records.none(name))
 
     def instances(self, name: str) -> list[Records]:
-        """The instances of a message; see `dataflash_records.instances`.  Those without any time are left out."""
+        """The instances of a message that have a time; see `dataflash_records.instances`."""
         found = instances(name, self.records, self._records)
         timed = [r for r in found if PLACE in r.columns or own_time_s(r) is not None]
         for r in found:
@@ -53,25 +51,21 @@ class MatlabMessages:
         """One column in our units (angles in degrees), shape (n,)."""
         return np.asarray(records.fields[column] * FIELDS.get(column, 1.0))
 
-    def table(self, records: Records, columns: tuple[str, ...]) -> Array:
-        """Columns in our units, shape (n, m)."""
-        return np.column_stack([self.column(records, column) for column in columns])
-
     @property
     def names(self) -> list[str]:
-        """Of the messages that are there."""
+        """Names of the messages in the file."""
         return sorted(self._records)
 
 
 def messages(path: Path, tables: Mapping[str, Table], content: Mapping[str, Any]) -> MatlabMessages | None:
-    """The messages in a file with these `tables`; None where they are not those of an ArduPilot log."""
+    """The messages in a file with these `tables`; None if they are not from an ArduPilot log."""
     made = MatlabMessages(path, tables, content)
     found = (r for name in INERTIAL for r in instances(name, made.records, tables))
     return made if any(set(GYRO) <= set(r.columns) and own_time_s(r) is not None for r in found) else None
 
 
 def _records(name: str, table: Table) -> Records:
-    """A table as records; those without a place in the log are before everything else."""
+    """A table as records; without ``LineNo`` they come before all others."""
     n = min(map(len, table.values()))
     fields = np.zeros(n, [(label, "f8") for label in table])
     for label, values in table.items():

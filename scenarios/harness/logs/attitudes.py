@@ -1,4 +1,4 @@
-"""Attitudes that a file holds as angles, a quaternion or a matrix, and attitudes at other times."""
+"""Attitudes in a file, as angles, quaternions or matrices, and their interpolation to other times."""
 
 from collections.abc import Mapping
 
@@ -14,22 +14,22 @@ from scenarios.harness.logs.quantities import EULER, MATRIX, QUATERNION
 from scenarios.harness.logs.recorded import LogError
 from sim.view.drawable import is_rotation
 
-NOT_STARTED = "of a filter that had not started"
-NO_ROTATION = "no rotation"
-MOST_DEG = 360.0  # a roll or pitch beyond this is no angle in degrees
+NOT_STARTED = "before the filter had started"
+NO_ROTATION = "not a rotation"
+MOST_DEG = 360.0  # larger rolls or pitches are not degrees
 _SAY_UNIT = 'write the unit into the header or a column map: "roll_deg", "yaw_rad"'
 Table = dict[str, Array]
 
 
 def form_of(table: Mapping[str, Array]) -> tuple[str, ...]:
-    """The columns that hold an attitude: of a matrix, a quaternion or three angles; empty where none do."""
+    """The columns that hold an attitude, as a matrix, a quaternion or three angles; empty if there are none."""
     return next((names for names in (MATRIX, QUATERNION, EULER) if all(name in table for name in names)), ())
 
 
 def attitude(table: Mapping[str, Array]) -> Array | None:
-    """The attitude that the columns hold, shape (N, 3, 3), NaN where unknown; None without such columns.
+    """The attitude in the columns, shape (N, 3, 3), NaN if unknown; None if there are no such columns.
 
-    A filter that has not started reports zeros: level and to the north, all three exactly, is no attitude then.
+    Three angles of exactly zero at the beginning mean that the filter had not started.
     """
     names = form_of(table)
     if not names:
@@ -50,13 +50,13 @@ def attitude(table: Mapping[str, Array]) -> Array | None:
 
 
 def rotations(R_eb: Array) -> Array:
-    """Matrices of shape (N, 3, 3), NaN where one is no rotation."""
+    """Matrices of shape (N, 3, 3), with NaN for those that are not rotations."""
     known = is_rotation(R_eb)
     return np.where(known[:, None, None], R_eb, np.nan)
 
 
 def reasons(table: Mapping[str, Array], R_eb: Array) -> tuple[NDArray[np.bool_], list[tuple[NDArray[np.bool_], str]]]:
-    """Rows in which the file holds something of an attitude, and why some of them hold none; see `accounts.samples`."""
+    """Rows with at least part of an attitude, and why some are not used; see `accounts.samples`."""
     values = np.column_stack([table[name] for name in form_of(table)])
     complete = np.asarray(np.isfinite(values).all(axis=1))
     unknown = np.asarray(~np.isfinite(R_eb).all(axis=(1, 2)))
@@ -68,11 +68,11 @@ def reasons(table: Mapping[str, Array], R_eb: Array) -> tuple[NDArray[np.bool_],
 
 
 def mend_angles(table: Table, source: checks.Source) -> bool:
-    """Convert angles without a given unit from degrees where they exceed what radians can be; whether they did.
+    """Convert angles without a unit from degrees if they exceed the range of radians; returns whether they did.
 
     Raises
     ------
-    LogError      angles that are neither, or a yaw that may be degrees or radians counted on over whole turns
+    LogError      angles that are neither, or a yaw that may be degrees or unwrapped radians
     """
     if not all(name in table for name in EULER):
         return False
@@ -84,23 +84,20 @@ def mend_angles(table: Table, source: checks.Source) -> bool:
         if largest[name] > MOST_DEG:
             raise LogError(f"{source.path}: {name} up to {largest[name]:g} is neither radians nor degrees; {_SAY_UNIT}")
     if not steep and _may_be_turns(table["yaw"]):
-        raise LogError(
-            f"{source.path}: yaw up to {largest['yaw']:g} may be degrees, or radians counted on over whole turns; "
-            f"{_SAY_UNIT}"
-        )
+        raise LogError(f"{source.path}: yaw up to {largest['yaw']:g} may be degrees or unwrapped radians; {_SAY_UNIT}")
     for name in EULER:
         table[name] = np.radians(table[name])
     return True
 
 
 def _may_be_turns(yaw: Array) -> bool:
-    """Whether a yaw may be radians that were counted on: from within a turn on, and never back by a whole one."""
+    """Whether a yaw may be unwrapped radians: it starts within one turn and never jumps by half a turn."""
     yaw = yaw[np.isfinite(yaw)]
     return bool(abs(yaw[0]) <= 6.4 and np.all(np.abs(np.diff(yaw)) < np.pi))
 
 
 def at_times(t_s: Array, R_eb: Array, times_s: Array) -> Array:
-    """Attitude `R_eb` of the times `t_s` at other times, on the shortest way, NaN where it is too far off."""
+    """Attitude `R_eb` at the times `t_s`, interpolated along the shortest rotation; NaN in gaps and outside."""
     known = np.isfinite(R_eb).all(axis=(1, 2)) & np.isfinite(t_s)
     found = np.full((len(times_s), 3, 3), np.nan)
     t_s, first = np.unique(t_s[known], return_index=True)

@@ -1,12 +1,12 @@
-"""What may be wrong in a log, whatever its format: mended and counted, or rejected with the row and the column.
+"""Checks of a log in any format: faults are repaired and counted, or rejected with the row and the column.
 
-Mended: rows without a number in time, gyro or accelerometer, and rows of zeros before the first reading, are left
-out, GPS fixes, magnetic and air samples without a number too; rows late by up to a second are sorted,
-repeated times left out; times in milli-, micro- or nanoseconds, rates in degrees and forces in g are converted.
-Reported: gaps.  Rejected: a column without a number, a clock that runs back, more rows bad than good, an accelerometer
-with the opposite sign, whatever is no inertial unit's at all.
+Repaired: rows without a number in time, gyro or accelerometer, rows of zeros before the first reading, and GPS fixes,
+magnetic and air samples without a number are left out; rows late by up to a second are sorted; repeated times are left
+out; times in milli-, micro- or nanoseconds, rates in degrees and forces in g are converted.  Reported: gaps.  Rejected:
+a column without a number, a clock that runs back, more bad rows than good, an accelerometer with the opposite sign,
+and values that no inertial unit has.
 
-Units are judged by what cannot be otherwise.  See `rate_factor` for the gyro.
+Units are inferred only from impossible values.  See `rate_factor` for the gyro.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,19 +17,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.blocks.screening import GYRO_RANGE_RAD_S, LONGEST_GAP_S
+from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.interface import G_M_S2, Array
+from estimator.params.shared import GYRO_RANGE_RAD_S
 from scenarios.harness.logs import accounts, gaps
 from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED, ZEROS
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.witnesses import witnesses
 
-LATEST_S = 1.0  # a row later than this is not late: the clock was set, or two logs are in one file
-LONGEST_LOG_S = 5e9  # longer than any clock runs; a timeline in nanoseconds holds no more
-FASTEST_HZ, SHORTEST_S = 20_000.0, 1e-6  # an interval below is none
-BUSIEST_RAD_S = 3.0  # no aeroplane turns faster for half of a log
-FEWEST, LEAST_RAD = 20, 0.1  # a witness that has seen less, in numbers or in angle, says nothing
+LATEST_S = 1.0  # rows later than this are rejected: the clock was set, or two logs are in one file
+LONGEST_LOG_S = 5e9  # longer than any clock runs, and the most that a timeline in nanoseconds holds
+FASTEST_HZ, SHORTEST_S = 20_000.0, 1e-6  # shorter intervals are invalid
+BUSIEST_RAD_S = 3.0  # no aeroplane turns faster than this for half of a log
+FEWEST, LEAST_RAD = 20, 0.1  # samples and angle that a witness needs
 _CLOCKS = ((1e6, "nanoseconds", 1e-9), (1e3, "microseconds", 1e-6), (1.0, "milliseconds", 1e-3))
 _PERIODS = (2.0**16, 86400.0, 604800.0, 86400.0e3, 604800.0e3, 2.0**32)  # of counters, days and weeks in s and ms
 _DEGREES = 180.0 / np.pi
@@ -38,14 +39,14 @@ _ARRIVALS = (
     ("mag_new", "magnetic samples", ("mag_b_ut",), "magnetometer"),
     ("air_new", "air-data samples", ("airspeed_m_s", "baro_height_m"), "airspeed"),
 )
-_EITHER = "air_new"  # arrives where one of its numbers is there: not every aeroplane has a pitot tube
+_EITHER = "air_new"  # one of its numbers is enough: not every aeroplane has a pitot tube
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """How a log's own words name a place in it: its file, its names of our quantities, its number of a row.
+    """How to name a place in a log: the file, its names for our quantities, its numbers of rows.
 
-    remedy : what to do where the specific force is the wrong way round      offered : names of all columns it has
+    remedy : what to do if the specific force has the wrong sign      offered : names of all its columns
     """
 
     path: Path
@@ -55,7 +56,7 @@ class Source:
     remedy: str = "its axes point up, or it reads gravity minus acceleration"
 
     def column(self, quantity: str) -> str:
-        """The file's own name of `quantity`."""
+        """The file's name for `quantity`."""
         own = self.columns.get(quantity, quantity)
         return f"column {own}" if own == quantity else f"column {own} ({quantity})"
 
@@ -66,7 +67,7 @@ class Source:
 
 
 def clock_factor(t_s: Array, source: Source, repairs: list[str]) -> float:
-    """Factor to seconds: an inertial unit that samples every second or more slowly is one whose unit is another."""
+    """Factor to seconds: if the samples are a second or more apart, the times are in another unit."""
     good = np.sort(t_s[np.isfinite(t_s)])
     steps = np.diff(good)
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
@@ -78,7 +79,7 @@ def clock_factor(t_s: Array, source: Source, repairs: list[str]) -> float:
 
 
 def unwrapped(ticks: Array) -> Array:
-    """Times of a counter that begins anew at a power of two, at the end of a day or of a week: continued.
+    """Times from a counter that restarts at a power of two, or at the end of a day or a week, made continuous.
 
     ticks : shape (N,), in the unit of the file
     """
@@ -131,7 +132,7 @@ def kept(
         raise LogError(f"{source.path}: {n - good.sum()} of {n} rows lack a number, the first is {source.row(first)}")
     keep = np.flatnonzero(good)
     latest_s = np.maximum.accumulate(t_s[keep])
-    behind_s = latest_s - t_s[keep]  # behind the latest so far, not the row before: a log may run back step by step
+    behind_s = latest_s - t_s[keep]  # behind the latest so far: a log may run back in small steps
     for k in np.flatnonzero(behind_s > LATEST_S)[:1]:
         why = f"runs back from {latest_s[k]:g} to {t_s[keep[k]]:g} s: a clock that was set, or two logs in one"
         raise source.refusal(int(keep[k]), "time", why)
@@ -155,9 +156,9 @@ def kept(
 
 
 def mended(log: RecordedLog, path: Path) -> RecordedLog:
-    """`log` as some reader gave it, with its rows put in order, and judged; see the module.
+    """`log` with its rows in order and checked; see the module.
 
-    What becomes of its rows and of what arrived in them is entered in its ledger, beside what its reader left out.
+    The ledger is completed with the rows and the samples in them that are used and left out here.
 
     Raises
     ------
@@ -186,13 +187,13 @@ def mended(log: RecordedLog, path: Path) -> RecordedLog:
 
 
 def judged(log: RecordedLog, source: Source, ledger: Ledger | None = None) -> RecordedLog:
-    """`log`, whose rows are in order, with intervals where it has none and units as they must be; gaps are reported.
+    """`log`, whose rows are in order, with missing intervals filled in and units corrected; gaps are reported.
 
-    ledger : where samples that arrived without a number are counted, by default nowhere
+    ledger : counts samples that arrived without a number, if given
 
     Raises
     ------
-    LogError      what no inertial unit would report
+    LogError      values that no inertial unit would report
     """
     rows, repairs = log.rows.copy(), list(log.repairs)
     _fill_intervals(rows, source, repairs)
@@ -209,7 +210,7 @@ def judged(log: RecordedLog, source: Source, ledger: Ledger | None = None) -> Re
 
 
 def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:
-    """Set ``dt_s`` where there is none; report gaps."""
+    """Fill in missing ``dt_s``; report gaps."""
     if len(rows) < 2:
         raise source.refusal(None, "time", "a log of one row")
     steps = np.diff(rows["t_s"])
@@ -224,7 +225,7 @@ def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> N
     short = gaps.missing(rows["t_s"], expected) & (steps <= LONGEST_GAP_S)
     if short.any():
         lost = np.maximum(np.round(steps / expected) - 1.0, 1.0)[short].sum()
-        repairs.append(f"{lost:.0f} samples lost, the next stands for them; first {_at(rows, short)}")
+        repairs.append(f"{lost:.0f} samples lost, covered by the next one; first {_at(rows, short)}")
     long = np.flatnonzero(steps > LONGEST_GAP_S)
     if len(long):
         k = int(long[np.argmax(steps[long])])
@@ -233,7 +234,7 @@ def _fill_intervals(rows: NDArray[Any], source: Source, repairs: list[str]) -> N
 
 
 def _check_arrivals(rows: NDArray[Any], repairs: list[str], ledger: Ledger) -> None:
-    """What arrived without a number in it did not arrive."""
+    """Remove samples that arrived without a number."""
     for new, what, columns, stream in _ARRIVALS:
         broken = rows[new] > 0
         there = [np.isfinite(rows[c]).reshape(len(rows), -1).all(axis=1) for c in columns]
@@ -250,34 +251,34 @@ def _at(rows: NDArray[Any], where: NDArray[np.bool_]) -> str:
 
 
 def _check_force(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:
-    """Half the time and more an aeroplane feels about its weight, and feels it downwards."""
+    """Check size and sign of the specific force: its median is about that of level flight."""
     length = float(np.median(np.linalg.norm(rows["force_b_m_s2"], axis=1)))
     if 0.5 < length < 2.5:
         repairs.append(f"{source.column('force')} in g, not m/s^2: converted")
         rows["force_b_m_s2"] *= G_M_S2
     elif not 0.5 * G_M_S2 < length < 2.5 * G_M_S2:
         counts = "; counts need a factor in a column map" if length > 100.0 * G_M_S2 else ""
-        why = f"{length:g} m/s^2 is its median; an aeroplane feels about {G_M_S2:.1f}{counts}"
+        why = f"its median is {length:g} m/s^2, that of an aeroplane about {G_M_S2:.1f}{counts}"
         raise source.refusal(None, "force", why)
     z = float(np.median(rows["force_b_m_s2"][:, 2]))
     if z > 0.5 * G_M_S2:
-        why = f"{z:.1f} m/s^2 is the median of z; specific force is {-G_M_S2:.1f} when level: {source.remedy}"
+        why = f"the median of z is {z:.1f} m/s^2; level specific force is {-G_M_S2:.1f}: {source.remedy}"
         raise source.refusal(None, "force", why)
 
 
 def rate_factor(rows: NDArray[Any], reference: Reference | None) -> float:
-    """Factor to rad/s: 1, or that between degrees and radians where the gyro is off by just that.
+    """Factor to rad/s: 1, or that between degrees and radians if the gyro is off by about that factor.
 
-    Two kinds of evidence, neither of which the log of an aeroplane in the right unit can give.
+    There are two kinds of evidence, and the log of an aeroplane in the right unit gives neither.
 
-    *Witnesses.*  What else in the log turns (`witnesses.witnesses`: the reference, the magnetic field, the course,
-    the direction of the specific force) is correlated with what the gyro says (above 0.7), and the gyro says 25 to
-    130 times as much, around the 57.3 between the two units.  A correlation needs turning, so an aeroplane at rest
-    says nothing; and a gyro in the right unit would have to overstate every turn 25 times, in step with it.  The
-    first witness that speaks decides.
+    *Witnesses.*  Something else in the log that turns (`witnesses.witnesses`: the reference, the magnetic field, the
+    course, the direction of the specific force) is correlated with the gyro above 0.7, and the gyro shows 25 to 130
+    times its rate, around the 57.3 between the two units.  Without turning there is no correlation, so a log at rest
+    gives no evidence; and a gyro in the right unit would have to overstate every turn 25 times.  The first witness
+    with a correlation decides.
 
-    *Range*, where none speaks.  One reading in a hundred beyond 2100 degrees a second, which no part in use reaches,
-    or half of them beyond 3 rad/s: no aeroplane turns once round in two seconds for half of a log.
+    *Range*, if there is no witness.  One reading in a hundred is beyond 2100 deg/s, which no part in use reaches, or
+    half of them are beyond 3 rad/s: no aeroplane makes a full turn every two seconds for half of a log.
     """
     for seen, said in witnesses(rows, reference):
         together = float(np.sum(seen * said))
@@ -294,7 +295,7 @@ def rate_factor(rows: NDArray[Any], reference: Reference | None) -> float:
 
 
 def _note_field(rows: NDArray[Any], source: Source, repairs: list[str]) -> None:
-    """A field that is not the earth's is kept, since its direction is what counts, and told."""
+    """Report a field that is not the earth's; it is kept, because only its direction is used."""
     field_ut = np.linalg.norm(rows["mag_b_ut"][rows["mag_new"] > 0], axis=1)
     if len(field_ut) and not 10.0 < np.median(field_ut) < 250.0:
-        repairs.append(f"{source.column('mag')}: {np.median(field_ut):.3g} uT is not the earth's field; kept as it is")
+        repairs.append(f"{source.column('mag')}: {np.median(field_ut):.3g} uT is not the earth's field; kept")

@@ -1,17 +1,17 @@
-"""What the columns of a table mean: our names for them, their units and signs.
+"""Column maps: what the columns of a table mean, with their units and signs.
 
-A map is a TOML file.  Its table ``[columns]`` gives each column that is used one of `QUANTITIES`, with a minus sign
-where the column counts the other way, and a unit where it is not ours; or a table of these and a linear scale, where
-value = factor * (number in the file - offset), in that unit::
+A map is a TOML file.  Its table ``[columns]`` gives a column one of `QUANTITIES`, with a minus sign where the column
+has the opposite sign, and a unit if it is not ours.  The long form adds a linear scale: value = factor * (number in the
+file - offset), in that unit.  Every entry is optional::
 
-    delimiter = ";"           # of a text file; found unless given.  " " is any number of blanks and tabs
-    decimal = ","             # of its numbers
-    skip_lines = 2            # before its header
-    names = ["t", "wx"]       # of its columns, where it has no header
+    delimiter = ";"           # of a text file; detected by default.  " " is any number of blanks and tabs
+    decimal = ","             # decimal sign of a text file
+    skip_lines = 2            # lines to skip before the header
+    names = ["t", "wx"]       # column names, for a file without a header
     struct = "flight_data"    # of a MATLAB file: the structure that holds the columns
-    axes = "forward-left-up"  # of the inertial unit and the magnetometer; forward-right-down unless given
+    axes = "forward-left-up"  # of gyro, accelerometer and magnetometer; forward-right-down by default
     force_reversed = true     # the accelerometer reads gravity minus acceleration
-    reference = "truth"       # what the attitude in the file is: truth, filter or firmware
+    reference = "truth"       # source of the attitude in the file: truth, filter or firmware
 
     [columns]
     time_ms = "time ms"
@@ -22,18 +22,18 @@ value = factor * (number in the file - offset), in that unit::
     [instruments]  # what is known of them, by the names of `estimator.instruments.PROPERTIES`
     gps_latency_s = 0.2
 
-``withheld = ["gps_rate_hz"]`` names properties that estimators do not receive although the log shows them.  Without a
-table ``[columns]`` the columns are recognised by their names, as they are without a map (`automatic`).
+``withheld = ["gps_rate_hz"]`` lists properties that are hidden from the estimators although the log shows them.
+Without ``[columns]`` the columns are recognised by their names, as they are without a map (`automatic`).
 """
 
 import math
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, get_args
 
 import numpy as np
 
@@ -41,16 +41,15 @@ from estimator.instruments import PROPERTIES, Known
 from estimator.interface import Array, ImuSample
 from scenarios.harness.logs import column_names, units
 from scenarios.harness.logs.quantities import QUANTITIES, Meaning
-from scenarios.harness.logs.recorded import LogError
+from scenarios.harness.logs.recorded import Kind, LogError
 from scenarios.harness.logs.units import UNITS
 from scenarios.harness.plugins import near_misses
 from sim.outside import files
 from sim.outside.wording import printable
 
 MAPS = Path(__file__).with_name("maps")  # maps that come with the package, named without .toml
-Kind = Literal["truth", "filter", "firmware"]
 _KEYS = ("columns", "delimiter", "decimal", "skip_lines", "names", "struct", "axes", "force_reversed", "reference",
-         "origin_deg", "instruments", "suits", "withheld", "on_ground")  # fmt: skip
+         "origin_deg", "instruments", "withheld", "on_ground")  # fmt: skip
 _ENTRIES = ("is", "unit", "factor", "offset")
 _DIRECTIONS = {  # of a sensor axis -> its unit vector in the body: forward, right, down
     "forward": (1, 0, 0), "back": (-1, 0, 0), "right": (0, 1, 0), "left": (0, -1, 0), "down": (0, 0, 1),
@@ -58,17 +57,14 @@ _DIRECTIONS = {  # of a sensor axis -> its unit vector in the body: forward, rig
 }  # fmt: skip
 
 
-_OLDER_NAMES = {"use_compass": "use_magnetometer"}
-
-
 @dataclass(frozen=True, slots=True)
 class ColumnMap:
-    """The meaning of columns by their names, and how to get at them; see the module.
+    """What the columns mean, by name, and how to read the file; see the module.
 
-    columns : empty where they are to be recognised       delimiter : empty where it is to be found
-    R_bs : shape (3, 3), from the axes of the sensors to the body, None where they are the same
-    rivals : quantity -> columns that are named for it equally well      origin_deg : latitude and longitude
-    on_ground : mean inertial sample at rest from before the log
+    columns : empty if they are to be recognised by name      delimiter : empty if it is to be detected
+    R_bs : shape (3, 3), from sensor axes to body axes, None where they are the same
+    rivals : quantity -> columns that match it equally well      origin_deg : latitude and longitude
+    on_ground : mean inertial sample at rest, taken before the log
     """
 
     columns: Mapping[str, Meaning] = field(default_factory=dict)
@@ -87,7 +83,7 @@ class ColumnMap:
     on_ground: ImuSample | None = None
 
     def of(self, header: Iterable[str], row_of_units: Mapping[str, str] | None = None) -> "ColumnMap":
-        """The same map, with the columns of `header` that are recognised where it names none."""
+        """The same map; if it names no columns, with those of `header` that are recognised."""
         if self.columns:
             return self
         found, rivals = column_names.automatic(header, row_of_units)
@@ -95,23 +91,23 @@ class ColumnMap:
 
 
 def automatic(header: Iterable[str], row_of_units: Mapping[str, str] | None = None) -> ColumnMap:
-    """Map of those columns of `header` whose names are understood; see `column_names`."""
+    """A map of the columns of `header` whose names are recognised; see `column_names`."""
     return ColumnMap().of(header, row_of_units)
 
 
 def load(spec: str | Path) -> ColumnMap:
-    """The map in the TOML file `spec`, or the one of that name that comes with the package.
+    """The map in the TOML file `spec`, or the shipped map of that name.
 
     Raises
     ------
-    LogError      no such map, or an entry that means nothing; one line with the map and the column
+    LogError      no such map, or an invalid entry; one line with the map and the column
     """
     path = Path(spec)
     if path.suffix != ".toml":
         path = MAPS / f"{spec}.toml"
     if not os.path.lexists(path):
         offered = sorted(p.stem for p in MAPS.glob("*.toml"))
-        raise LogError(f"no column map {str(spec)!r}: {near_misses(str(spec), offered)} (your own: a file.toml)")
+        raise LogError(f"no column map {str(spec)!r}: {near_misses(str(spec), offered)} (or the path of a .toml file)")
     with files.reading(path, LogError):
         return _loaded(path)
 
@@ -125,54 +121,70 @@ def _loaded(path: Path) -> ColumnMap:
         if key not in _KEYS:
             raise LogError(f"{path}: unknown entry {key!r}: {near_misses(key, _KEYS)}")
     if not data:
-        raise LogError(f"{path}: empty; a map has a table [columns], or says axes, names, struct or [instruments]")
+        raise LogError(f"{path}: empty; a map has a table [columns], or entries such as axes, names, [instruments]")
     entries = data.get("columns", {})
     if not isinstance(entries, dict):
         raise LogError(f'{path}: columns must be a table: [columns], with a line name = "quantity unit" for each')
     columns = {column: _meaning(entry, f"{path}: {column} = {_shown(entry)}") for column, entry in entries.items()}
     _check_twice(columns, path)
+
+    def checked(key: str, default: Any, valid: Callable[[Any], bool], right: str) -> Any:
+        if key in data and not valid(data[key]):
+            raise LogError(f"{path}: {key} = {data[key]!r} must be {right}")
+        return data.get(key, default)
+
+    origin = checked("origin_deg", None, _is_place, "a latitude and a longitude in degrees")
+    form = 'one character: "," ";" "|" "\\t", or " " for blanks'
     return ColumnMap(
         columns,
-        skip_lines=_whole(data, path),
-        struct=_text(data, "struct", path),
+        delimiter=checked("delimiter", "", lambda v: isinstance(v, str) and len(v) == 1, form),
+        decimal=checked("decimal", "", lambda v: v in (".", ","), '"." or ","'),
+        names=tuple(checked("names", [], _is_names, 'a list of names, as in names = ["t", "gx"]')),
+        skip_lines=checked("skip_lines", 0, lambda v: type(v) is int and v >= 0, "a whole number, zero or more"),
+        struct=checked("struct", "", lambda v: isinstance(v, str), "the name of a structure"),
         known=_known(data, path),
         name=path.stem,
-        **_form(data, path),
-        R_bs=_axes(data, path),
-        force_reversed=_flag(data, path),
-        reference=_kind(data, path),
-        origin_deg=_origin(data, path),
+        R_bs=_axes(checked("axes", "", lambda v: isinstance(v, str), 'text, as in "forward-left-up"'), path),
+        force_reversed=checked("force_reversed", False, lambda v: isinstance(v, bool), "true or false"),
+        reference=checked("reference", "filter", lambda v: v in get_args(Kind), "truth, filter or firmware"),
+        origin_deg=None if origin is None else (float(origin[0]), float(origin[1])),
         on_ground=_on_ground(data, path),
     )
 
 
+def _is_place(value: Any) -> bool:
+    if not isinstance(value, list) or len(value) != 2 or not all(isinstance(v, int | float) for v in value):
+        return False
+    return abs(value[0]) <= 90.0 and abs(value[1]) <= 360.0
+
+
+def _is_names(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
 def _on_ground(data: Mapping[str, Any], path: Path) -> ImuSample | None:
-    """The mean inertial sample of the table [on_ground]: seconds averaged, rad/s, m/s^2."""
+    """The mean inertial sample in the table [on_ground]: seconds averaged, rad/s, m/s^2."""
     table = data.get("on_ground")
     if table is None:
         return None
     wanted = {"seconds": 1, "gyro_b_rad_s": 3, "force_b_m_s2": 3}
-    right = "[on_ground] must have seconds, gyro_b_rad_s and force_b_m_s2: a number, and three numbers each"
-    if not isinstance(table, dict) or set(table) != set(wanted):
-        raise LogError(f"{path}: {right}")
+    right = "[on_ground] must have seconds (a number), gyro_b_rad_s and force_b_m_s2 (three numbers each)"
     try:
-        values = {name: np.array(table[name], np.float64) for name in wanted}
+        values = {name: np.array(table[name], np.float64) for name in table}
     except (TypeError, ValueError):
         raise LogError(f"{path}: {right}") from None
-    if any(v.size != wanted[n] or not np.isfinite(v).all() for n, v in values.items()):
+    if set(values) != set(wanted) or any(v.size != wanted[n] or not np.isfinite(v).all() for n, v in values.items()):
         raise LogError(f"{path}: {right}")
     return ImuSample(0.0, float(values["seconds"]), values["gyro_b_rad_s"], values["force_b_m_s2"])
 
 
 def _meaning(entry: Any, where: str) -> Meaning:
-    """The meaning spelled ``-force.z g``, or as a table; `where` begins the message where it is none."""
+    """The meaning of an entry, ``-force.z g`` or a table; `where` begins the error message."""
     factor, offset = 1.0, 0.0
     if isinstance(entry, dict):
         for key in entry:
-            if key not in ("is", "unit", "factor", "offset"):
-                raise LogError(
-                    f"{where}: unknown entry {key!r}: {near_misses(key, ('is', 'unit', 'factor', 'offset'))}"
-                )
+            if key not in _ENTRIES:
+                raise LogError(f"{where}: unknown entry {key!r}: {near_misses(key, _ENTRIES)}")
         spelled, unit = entry.get("is"), entry.get("unit", "")
         factor, offset = (_number(entry.get(k, d), k, where) for k, d in (("factor", 1.0), ("offset", 0.0)))
         if factor == 0.0:
@@ -184,12 +196,12 @@ def _meaning(entry: Any, where: str) -> Meaning:
     quantity, unit = spelled.strip().removeprefix("-"), unit.strip()
     if quantity not in QUANTITIES:
         raise LogError(f"{where}: unknown quantity {quantity!r}: {near_misses(quantity, QUANTITIES)}")
-    dimension = QUANTITIES[quantity].dimension
+    dimension = QUANTITIES[quantity]
     by_unit = units.factor_of(unit, dimension) if unit else 1.0
     if by_unit is None and units.plain(unit) in units.COUNTS:
         ours = next(iter(UNITS[dimension]))
         raise LogError(
-            f"{where}: {unit} is no unit: say what one of them is, as in "
+            f"{where}: {unit} is not a unit: give the size of one, as in "
             f'{{ is = "{quantity}", unit = "{ours}", factor = 0.001, offset = 0 }}'
         )
     if by_unit is None:
@@ -205,7 +217,7 @@ def _shown(entry: Any) -> str:
 
 
 def _finite(value: float) -> bool:
-    """Whether it is a number that can be worked with: not infinite, and no whole number beyond all others."""
+    """Whether `value` is neither infinite nor an integer too large to compute with."""
     return abs(value) < files.LARGEST_NUMBER
 
 
@@ -216,65 +228,24 @@ def _number(value: Any, key: str, where: str) -> float:
 
 
 def _check_twice(columns: Mapping[str, Meaning], path: Path) -> None:
-    """One column for each quantity, but for the time: columns of another length have one of their own."""
+    """Refuse two columns for one quantity, except time: columns of another length have their own times."""
     seen: dict[str, str] = {}
     for column, meaning in columns.items():
         quantity = meaning.quantity
         if quantity in seen and quantity != "time":
-            raise LogError(f"{path}: {quantity} is the meaning of two columns, {seen[quantity]} and {column}")
+            raise LogError(f"{path}: {quantity} is assigned to two columns, {seen[quantity]} and {column}")
         seen[quantity] = column
 
 
 def matrix_of(column: str) -> str:
-    """The matrix or structure to which ``IMU.GyrX`` or ``IMU[3]`` belongs; empty for a column by itself."""
+    """The matrix or structure of a column such as ``IMU.GyrX`` or ``IMU[3]``; empty for a plain column."""
     if column.endswith("]"):
         return column.rpartition("[")[0]
     return column.rpartition(".")[0]
 
 
-def _text(data: Mapping[str, Any], key: str, path: Path) -> str:
-    value = data.get(key, "")
-    if not isinstance(value, str):
-        raise LogError(f"{path}: {key} = {value!r} must be a text")
-    return value
-
-
-def _whole(data: Mapping[str, Any], path: Path) -> int:
-    value = data.get("skip_lines", 0)
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise LogError(f"{path}: skip_lines = {value!r} must be a whole number, zero or more")
-    return value
-
-
-def _flag(data: Mapping[str, Any], path: Path) -> bool:
-    value = data.get("force_reversed", False)
-    if not isinstance(value, bool):
-        raise LogError(f"{path}: force_reversed = {value!r} must be true or false")
-    return value
-
-
-def _form(data: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """How a text file is written: delimiter, decimal sign, names of columns."""
-    delimiter, decimal, names = _text(data, "delimiter", path), _text(data, "decimal", path), data.get("names", [])
-    if "delimiter" in data and len(delimiter) != 1:
-        raise LogError(f'{path}: delimiter = {delimiter!r} must be one character: "," ";" "|" "\\t", or " " for blanks')
-    if decimal not in ("", ".", ","):
-        raise LogError(f'{path}: decimal = {decimal!r} must be "." or ","')
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise LogError(f'{path}: names must be a list of texts, as in names = ["t", "gx"]')
-    return {"delimiter": delimiter, "decimal": decimal, "names": tuple(names)}
-
-
-def _kind(data: Mapping[str, Any], path: Path) -> Kind:
-    kind = data.get("reference", "filter")
-    if kind not in ("truth", "filter", "firmware"):
-        raise LogError(f"{path}: reference = {kind!r} must be truth, filter or firmware")
-    return cast(Kind, kind)
-
-
-def _axes(data: Mapping[str, Any], path: Path) -> Array | None:
-    """The rotation from the axes of the sensors to forward, right, down."""
-    spelled = _text(data, "axes", path)
+def _axes(spelled: str, path: Path) -> Array | None:
+    """The rotation from sensor axes to forward, right, down."""
     if not spelled:
         return None
     words = spelled.lower().replace(",", "-").replace(" ", "-").split("-")
@@ -284,61 +255,48 @@ def _axes(data: Mapping[str, Any], path: Path) -> Array | None:
     R_bs = np.array([_DIRECTIONS[d] for d in full if d], dtype=np.float64).T
     if len(full) != 3 or not all(full) or abs(abs(np.linalg.det(R_bs)) - 1.0) > 0.5:
         raise LogError(
-            f"{path}: axes = {spelled!r}: say where x, y and z point, each of forward or back, right or left, down or "
+            f"{path}: axes = {spelled!r}: give the directions of x, y and z, each forward, back, right, left, down or "
             'up, as in "forward-left-up"'
         )
     if np.linalg.det(R_bs) < 0.0:
-        raise LogError(f"{path}: axes = {spelled!r} are left-handed; those of an inertial unit are right-handed")
+        raise LogError(f"{path}: axes = {spelled!r} are left-handed; they must be right-handed")
     return None if np.array_equal(R_bs, np.eye(3)) else R_bs
 
 
-def _origin(data: Mapping[str, Any], path: Path) -> tuple[float, float] | None:
-    origin = data.get("origin_deg")
-    if origin is None:
-        return None
-    numbers = isinstance(origin, list) and all(isinstance(v, int | float) for v in origin) and len(origin) == 2
-    if not numbers or not (abs(origin[0]) <= 90.0 and abs(origin[1]) <= 360.0):
-        raise LogError(f"{path}: origin_deg = {origin!r} must be a latitude and a longitude in degrees")
-    return float(origin[0]), float(origin[1])
-
-
 def _known(data: Mapping[str, Any], path: Path) -> dict[str, Known]:
-    """The table ``[instruments]``; ``[suits]`` is its older name."""
+    """What the table ``[instruments]`` and the list ``withheld`` say of the instruments."""
+    entries = data.get("instruments", {})
+    if not isinstance(entries, dict):
+        raise LogError(f"{path}: instruments must be a table: [instruments]")
     found: dict[str, Known] = {}
-    for table in ("suits", "instruments"):
-        entries = data.get(table, {})
-        if not isinstance(entries, dict):
-            raise LogError(f"{path}: {table} must be a table: [{table}]")
-        for spelled, value in entries.items():
-            name = str(_OLDER_NAMES.get(spelled, spelled))
-            if name == "calibration":  # dotted keys make a table of it
-                if not isinstance(value, dict):
-                    raise LogError(f"{path}: [{table}] calibration = {_shown(value)}: must be a table")
-                found |= {f"calibration.{n}": Known(v, "log", path.name) for n, v in dict(value).items()}
-                continue
-            if name not in PROPERTIES and name not in parameters():
-                possible = {*PROPERTIES, *parameters()}
-                raise LogError(f"{path}: [{table}] {name}: no such property: {near_misses(name, possible)}")
-            endless = name.endswith(("full_scale_rad_s", "full_scale_m_s2")) and value == math.inf
-            if not isinstance(value, int | float) or not (_finite(value) or endless):
-                raise LogError(f"{path}: [{table}] {name} = {value!r} must be a number, true or false")
-            found[name] = Known(value, "log", path.name)
+    for name, value in entries.items():
+        where = f"{path}: [instruments] {name}"
+        if name == "calibration":  # its dotted keys make a table
+            if not isinstance(value, dict):
+                raise LogError(f"{where} = {_shown(value)}: must be a table")
+            found |= {f"calibration.{n}": Known(v, "log", path.name) for n, v in dict(value).items()}
+            continue
+        if name not in PROPERTIES and name not in parameters():
+            raise LogError(f"{where}: no such property: {near_misses(name, {*PROPERTIES, *parameters()})}")
+        endless = name.endswith(("full_scale_rad_s", "full_scale_m_s2")) and value == math.inf
+        if not isinstance(value, int | float) or not (_finite(value) or endless):
+            raise LogError(f"{where} = {value!r} must be a number, true or false")
+        found[name] = Known(value, "log", path.name)
     withheld = data.get("withheld", [])
     if not isinstance(withheld, list):
         raise LogError(f'{path}: withheld must be a list of properties, as in withheld = ["gps_rate_hz"]')
-    for name in withheld:
-        if not isinstance(name, str) or name not in PROPERTIES or name in found:
-            why = (
-                "it has a value too" if isinstance(name, str) and name in found else near_misses(str(name), PROPERTIES)
-            )
-            raise LogError(f"{path}: withheld {name!r}: {why}")
+    for name in map(str, withheld):
+        if name not in PROPERTIES:
+            raise LogError(f"{path}: withheld {name!r}: {near_misses(name, PROPERTIES)}")
+        if name in found:
+            raise LogError(f"{path}: withheld {name!r}: it also has a value in [instruments]")
         found[name] = Known(PROPERTIES[name].assumed, "withheld", path.name)
     return found
 
 
 @lru_cache(maxsize=1)
 def parameters() -> frozenset[str]:
-    """Names of the parameters of every registered estimator that can be loaded here."""
+    """Names of the parameters of all registered estimators that can be loaded."""
     from dataclasses import is_dataclass
 
     from scenarios.harness import plugins
@@ -348,7 +306,7 @@ def parameters() -> frozenset[str]:
     for name in plugins.estimators():
         try:
             params = plugins.params_of(name, plugins.load_estimator(name))
-        except ValueError:  # one that lacks its package
+        except ValueError:  # its package is not installed
             continue
         if is_dataclass(params):
             found |= set(dotted_fields(params))

@@ -1,10 +1,10 @@
-"""What a column holds, by its name: words for the kind, an axis or an index, and a unit.
+"""Columns recognised by their names: words for the quantity, an axis or an index, and a unit.
 
 A header such as ``Gyroscope X (deg/s)``, ``gyroRotationX(rad/s)``, ``field.angular_velocity.x``, ``gyro_rad[0]`` or
-``measured.gyro_b_rad_s.x`` is split into words.  Its unit stands in brackets or is the last words; the axis is a
-letter, an index, or what of roll, pitch and yaw a rate is of; what remains must name a quantity.  Words that only say
-where a value comes from (``imu``, ``sensor``, ``raw``) are passed over, one word that is not known lowers the rank of
-a name, and words such as ``bias``, ``desired`` or ``sigma`` rule it out.
+``measured.gyro_b_rad_s.x`` is split into words.  The unit is in brackets or in the last words.  The axis is a letter,
+an index, or roll, pitch or yaw for a rate.  The other words must name a quantity.  Words that only give the source
+(``imu``, ``sensor``, ``raw``) are ignored, one unknown word lowers the rank of a name, and words such as ``bias``,
+``desired`` or ``sigma`` rule it out.
 """
 
 import re
@@ -17,26 +17,19 @@ from scenarios.harness.logs.quantities import QUANTITIES, Meaning
 _AXES = {"x": "x", "y": "y", "z": "z", "0": "x", "1": "y", "2": "z"}
 _EARTH = {"n": "n", "e": "e", "d": "d", "north": "n", "east": "e", "down": "d", "0": "n", "1": "e", "2": "d"}
 _TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
-_STRONG = {  # words that name a vector whatever stands beside them
+_STRONG = {  # one of these words names a vector
     "gyro": {"gyro", "gyros", "gyroscope", "gyr", "omega"},
     "force": {"acc", "accel", "accelerometer", "acceleration", "accelerations", "accels", "force"},
     "mag": {"mag", "magnetometer", "magnetic", "magn", "magnet"},
 }
-_PHRASES = {  # words that name it together
-    "gyro": (
-        {"angular", "velocity"},
-        {"angular", "rate"},
-        {"rotation", "rate"},
-        {"angular", "vel"},
-        {"turn", "rate"},
-        {"ang", "rate"},
-        {"ang", "vel"},
-    ),
+_PHRASES = {  # these words together name it
+    "gyro": ({"angular", "velocity"}, {"angular", "rate"}, {"rotation", "rate"}, {"angular", "vel"}, {"turn", "rate"},
+             {"ang", "rate"}, {"ang", "vel"}),
     "force": ({"specific", "force"}, {"linear", "accel"}),
     "mag": ({"mag", "field"},),
-}
+}  # fmt: skip
 _HELPING = {"gyro": {"rotation", "rate", "angular", "velocity"}, "force": {"specific", "linear"}, "mag": {"field"}}
-_WEAK = {"gyro": {"g", "w"}, "force": {"a", "f"}, "mag": {"m", "h", "b"}}  # letters that name it alone with an axis
+_WEAK = {"gyro": {"g", "w"}, "force": {"a", "f"}, "mag": {"m", "h", "b"}}  # a single letter with an axis
 _GLUED = re.compile(r"(gyro|gyr|omega|accel|acc|mag|magn|force|vel|[gwafmhvb])([xyzned])|(q|quat)([wxyz])")
 _NEUTRAL = {
     "imu", "sensor", "sensors", "data", "measured", "raw", "b", "body", "frame", "value", "values", "combined", "axis",
@@ -83,24 +76,24 @@ _SCALARS: tuple[tuple[frozenset[str], str], ...] = tuple(
 )  # fmt: skip
 
 
-_UNTOLD = 20  # added to the rank of a clock whose unit is not given
+_NO_UNIT = 20  # added to the rank of a clock without a unit
 
 
-class Heard(NamedTuple):
-    """What a name may mean: the quantity, a factor to our unit, whether the name gives the unit, and words left over.
+class Candidate(NamedTuple):
+    """What a name may mean: the quantity, a factor to our unit, if the name gives the unit, and a rank (0 is best).
 
-    stem : the name without its axis: columns of one vector share it
+    stem : the name without its axis, which the columns of one vector share
     """
 
     quantity: str
     factor: float
-    told: bool
+    unit_given: bool
     rank: int
     stem: str
 
 
 class Name(NamedTuple):
-    """A name taken apart: its words in lower case, the indices in brackets, and the unit in brackets, if any."""
+    """The parts of a name: its words in lower case, the indices in brackets, and the unit in brackets, if any."""
 
     words: tuple[str, ...]
     indices: tuple[str, ...]
@@ -108,14 +101,14 @@ class Name(NamedTuple):
 
 
 def split(header: str, unit: str = "") -> Name:
-    """Take a header apart; `unit` is what a row of units below says."""
+    """The parts of a header; `unit` is from the row of units below it, if there is one."""
     indices = []
     for inside in re.findall(r"[(\[<]([^()\[\]<>]*)[)\]>]", header):
         if inside.strip().isdigit():
             indices.append(inside.strip())
         elif inside.strip().lower() in _AXES:
             header = header.replace(inside, f" {inside} ")  # an axis in brackets is a word
-        elif units.is_unit(inside) or re.search(r"[/^]", inside):  # one that is unknown is no unit of ours either
+        elif units.is_unit(inside) or re.search(r"[/^]", inside):  # also if it is unknown
             unit = unit or inside
     bare = re.sub(r"[(\[<](?!\s[xyzXYZ]\s)[^()\[\]<>]*[)\]>]", " ", header)
     bare = re.sub(r"(?<![a-zA-Z])([unµμ])T(?![a-z])", lambda m: "ut" if m[1] != "n" else "nt", bare)
@@ -123,16 +116,16 @@ def split(header: str, unit: str = "") -> Name:
     return Name(tuple(word.lower() for word in words), tuple(indices), unit)
 
 
-def meanings(header: str, unit: str = "") -> list[Heard]:
-    """Everything that the name may mean, the best ranks first."""
+def meanings(header: str, unit: str = "") -> list[Candidate]:
+    """All possible meanings of a name, the best rank first."""
     name = split(header, unit)
     words = list(name.words)
-    found: dict[str, Heard] = {}
+    found: dict[str, Candidate] = {}
     trials = [(words, name.unit)]
     if not name.unit:
         tail = words[:-1] if len(words) > 1 and words[-1] in (*_AXES, *_EARTH, "w") else words
         ending, n = units.at_end(tail)
-        if n:  # with the unit first; without it where the quantity is of another dimension
+        if n:  # first with the unit, then without it for a quantity of another dimension
             kept = tail[: len(tail) - n] + words[len(tail) :]
             trials.insert(0, (kept, ending))
         ending, n = units.at_end(words)
@@ -144,14 +137,14 @@ def meanings(header: str, unit: str = "") -> list[Heard]:
                 continue
             factor = units.factor_of(spelled, _dimension(quantity)) if spelled else 1.0
             if factor is not None:
-                told = bool(spelled) or sign not in (1.0, -1.0)
-                worse = 0 if told or quantity != "time" else _UNTOLD  # of two clocks the one whose unit is given
-                found[quantity] = Heard(quantity, sign * factor, told, rank + worse, stem)
-    return sorted(found.values(), key=lambda heard: heard.rank)
+                unit_given = bool(spelled) or sign not in (1.0, -1.0)
+                worse = 0 if unit_given or quantity != "time" else _NO_UNIT  # of two clocks the one with a unit counts
+                found[quantity] = Candidate(quantity, sign * factor, unit_given, rank + worse, stem)
+    return sorted(found.values(), key=lambda candidate: candidate.rank)
 
 
 def _dimension(quantity: str) -> str:
-    return "number" if quantity.startswith("q#") else QUANTITIES[quantity].dimension
+    return "number" if quantity.startswith("q#") else QUANTITIES[quantity]
 
 
 def _named(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, int, str, float]]:
@@ -173,7 +166,7 @@ def _named(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, int, s
 
 
 def _unglued(word: str, *, alone: bool) -> list[str]:
-    """``gyrx`` is gyr and x; ``gx`` too where it stands alone."""
+    """``gyrx`` is gyr and x; so is ``gx`` if it is the only word."""
     match = _GLUED.fullmatch(word)
     stem, axis = (match[1] or match[3], match[2] or match[4]) if match else ("", "")
     return [stem, axis] if stem and (alone or len(stem) > 1) else [word]
@@ -209,7 +202,7 @@ def _vector(words: list[str], indices: tuple[str, ...]) -> Iterable[tuple[str, i
         others = set().union(*(s for n, s in _STRONG.items() if n != name))
         rest = set(bare) - _NEUTRAL - strong - _HELPING[name]
         by_words = strong & set(bare) or any(phrase <= set(bare) for phrase in _PHRASES[name])
-        letters = set(bare) - _NEUTRAL or set(bare) & {"b"}  # B is the field, where it is not the body's frame
+        letters = set(bare) - _NEUTRAL or set(bare) & {"b"}  # B is the field, unless it is the body frame
         if by_words and not others & set(bare) and len(rest) <= 1:
             yield f"{name}.{axis}", 2 * len(rest) + 2 * len(instance), _stem(bare, instance), 1.0
         elif len(letters) == 1 and letters <= _WEAK[name] and not instance and not indices:
@@ -244,7 +237,7 @@ def _velocity(words: list[str], indices: tuple[str, ...]) -> Iterable[tuple[str,
 
 
 def _angle(words: list[str]) -> Iterable[tuple[str, int, str, float]]:
-    """Roll, pitch and yaw; those of a reference or the truth before others."""
+    """Roll, pitch and yaw; a reference or the truth ranks before others."""
     named = [w for w in words if w in _ANGLES]
     present = set(words)
     if len(named) != 1 or present & {"rate", "speed", "magnetic", "mag", "gyro", "accel", "acc", "velocity", *_GPS}:
@@ -260,7 +253,7 @@ def _angle(words: list[str]) -> Iterable[tuple[str, int, str, float]]:
 
 
 def _quaternion(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, int, str, float]]:
-    """``qw`` to ``qz``; with a number the scalar part is the first, see `shifted`."""
+    """``qw`` to ``qz``; numbered elements begin with the scalar part, see `_number_quaternions`."""
     names = {"q", "quat", "quaternion", "orientation"}
     rest = set(words) - _NEUTRAL - _TRUTH - names
     if not names & set(words):
@@ -277,7 +270,7 @@ def _quaternion(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, i
 
 
 def _matrix(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, int, str, float]]:
-    """``r00`` to ``r22``, also by letters: ``R_eb.zx``."""
+    """``r00`` to ``r22``, or letters: ``R_eb.zx``."""
     if "flown" in words or not {"r", "dcm", "rot", "rotation"} & set(words):
         return []
     rest = [w for w in words if w not in {"r", "dcm", "rot", "rotation", "eb", "matrix"} | _TRUTH | _NEUTRAL]
@@ -289,7 +282,7 @@ def _matrix(words: list[str], indices: tuple[str, ...]) -> list[tuple[str, int, 
 
 
 def _scalar(words: list[str], indices: tuple[str, ...]) -> Iterable[tuple[str, int, str, float]]:
-    """Whatever has neither axis nor index; the first words of `_SCALARS` rank before later ones."""
+    """Quantities without axis or index; earlier entries of `_SCALARS` rank before later ones."""
     synonyms = {"gnss": "gps", "location": "gps", "receiver": "gps", "ublox": "gps", "barometer": "baro"}
     present = {synonyms.get(w, w) for w in words}
     if "truth" in present or indices:
@@ -313,33 +306,33 @@ def _time(words: list[str]) -> Iterable[tuple[str, int, str, float]]:
 def automatic(
     header: Iterable[str], row_of_units: Mapping[str, str] | None = None
 ) -> tuple[dict[str, Meaning], dict[str, tuple[str, ...]]]:
-    """Meanings of those columns of `header` whose names are understood, and names that compete for one quantity.
+    """Meanings of the columns of `header` that are recognised, and columns that compete for one quantity.
 
-    row_of_units : column -> unit, as a row below the header says
+    row_of_units : column -> unit, from a row below the header
 
     Returns
     -------
-    column -> its meaning; quantity -> columns, two at least, of which none is named better than the others
+    column -> its meaning; quantity -> two or more columns with equally good names
     """
     said = row_of_units or {}
-    heard: dict[str, list[tuple[str, Heard]]] = {}
+    candidates: dict[str, list[tuple[str, Candidate]]] = {}
     for column in dict.fromkeys(header):
         for one in meanings(column, said.get(column, "")):
-            heard.setdefault(one.quantity, []).append((column, one))
-    _number_quaternions(heard)
+            candidates.setdefault(one.quantity, []).append((column, one))
+    _number_quaternions(candidates)
     chosen, rivals = dict[str, Meaning](), dict[str, tuple[str, ...]]()
-    for group in _groups(heard):
-        best = _best_stems(group, heard)
+    for group in _groups(candidates):
+        best = _best_stems(group, candidates)
         for quantity in group:
-            if quantity not in heard:
+            if quantity not in candidates:
                 continue
-            named = [(column, one) for column, one in heard[quantity] if best is None or one.stem in best]
+            named = [(column, one) for column, one in candidates[quantity] if best is None or one.stem in best]
             least = min(one.rank for _, one in named) if named else 0
             named = [(column, one) for column, one in named if one.rank == least and column not in chosen]
             if len(named) > 1:
                 rivals[quantity] = tuple(column for column, _ in named)
             for column, one in named[:1]:
-                chosen[column] = Meaning(one.quantity, one.factor, one.told)
+                chosen[column] = Meaning(one.quantity, one.factor, one.unit_given)
     return chosen, rivals
 
 
@@ -349,36 +342,36 @@ _VECTORS = (
 )  # fmt: skip
 
 
-def _groups(heard: Mapping[str, object]) -> list[tuple[str, ...]]:
-    """Quantities that belong together, and all others one by one."""
+def _groups(candidates: Mapping[str, object]) -> list[tuple[str, ...]]:
+    """Quantities that form a vector, and all others one by one."""
     together = {quantity for group in _VECTORS for quantity in group}
-    return [*_VECTORS, *((quantity,) for quantity in heard if quantity not in together and quantity in QUANTITIES)]
+    return [*_VECTORS, *((quantity,) for quantity in candidates if quantity not in together and quantity in QUANTITIES)]
 
 
-def _best_stems(group: tuple[str, ...], heard: Mapping[str, list[tuple[str, Heard]]]) -> set[str] | None:
-    """The stems of the best rank that name most of the vector; None for a single quantity."""
+def _best_stems(group: tuple[str, ...], candidates: Mapping[str, list[tuple[str, Candidate]]]) -> set[str] | None:
+    """The best stems: most elements of the vector, then the best rank; None for a single quantity."""
     if len(group) == 1:
         return None
     ranks: dict[str, dict[str, int]] = {}
     for quantity in group:
-        for _, one in heard.get(quantity, []):
+        for _, one in candidates.get(quantity, []):
             of_stem = ranks.setdefault(one.stem, {})
             of_stem[quantity] = min(one.rank, of_stem.get(quantity, one.rank))
     if not ranks:
         return set()
     most = min((-len(named), max(named.values())) for named in ranks.values())
     found = {stem for stem, named in ranks.items() if (-len(named), max(named.values())) == most}
-    if -most[0] < len(group):  # spread over several stems: no one of them is the vector
+    if -most[0] < len(group):  # no single stem names the whole vector
         return set(ranks)
     return found
 
 
-def _number_quaternions(heard: dict[str, list[tuple[str, Heard]]]) -> None:
-    """Give numbered elements their letters: from 0 or from 1 on, the scalar part first."""
-    numbered = {i: heard.pop(f"q#{i}") for i in range(5) if f"q#{i}" in heard}
+def _number_quaternions(candidates: dict[str, list[tuple[str, Candidate]]]) -> None:
+    """Give numbered elements, from 0 or from 1, their letters; the scalar part is the first."""
+    numbered = {i: candidates.pop(f"q#{i}") for i in range(5) if f"q#{i}" in candidates}
     first = 0 if 0 in numbered else 1
     if set(numbered) != set(range(first, first + 4)):
         return
     for i, letter in enumerate("wxyz"):
         renamed = [(column, one._replace(quantity=f"q{letter}")) for column, one in numbered[first + i]]
-        heard.setdefault(f"q{letter}", []).extend(renamed)
+        candidates.setdefault(f"q{letter}", []).extend(renamed)

@@ -1,9 +1,9 @@
-"""The records of an ArduPilot DataFlash log, by the names of their messages.
+"""The records of an ArduPilot DataFlash log, by message name.
 
-A log is a row of packed records: two bytes of header, a type, and the fields as the FMT record of that type says;
-UNIT, MULT and FMTU hold units, else they are those of `FIELDS`.  Records are found here, since pymavlink's reader
-gives up the rest of a log where damaged bytes look like a type that it does not know; a record counts where the next
-header follows it.  What the characters of a format mean comes from pymavlink.
+A log is a sequence of packed records: two header bytes, a type, and fields as defined by the FMT record of that type.
+Units come from UNIT, MULT and FMTU, or from `FIELDS`.  Records are located here and not by pymavlink, whose reader
+drops the rest of a log if damaged bytes look like an unknown type; a record is accepted if the next header follows it.
+The meaning of the format characters comes from pymavlink.
 """
 
 import struct
@@ -23,18 +23,18 @@ from sim.outside import files
 
 HEADER, FMT, FMT_LENGTH = b"\xa3\x95", 128, 89
 _DEG = np.pi / 180.0
-LABELS = {  # of UNIT -> factor to ours: angles stay in degrees, rates are in radians
+LABELS = {  # label in UNIT -> factor to ours: angles stay in degrees, rates are in radians
     "rad/s": 1.0, "deg/s": _DEG, "m/s/s": 1.0, "m/s": 1.0, "m": 1.0, "Gauss": 100.0,
     "deg": 1.0, "degheading": 1.0, "deglatitude": 1.0, "deglongitude": 1.0, "rad": 1.0 / _DEG,
 }  # fmt: skip
-FIELDS = dict.fromkeys(("MagX", "MagY", "MagZ"), 0.1)  # factor to ours without units: milligauss; others are in ours
-FEWEST = 0.01  # an instance with a smaller share of the messages than this is a damaged byte
-SET_S = 10.0  # messages further than this from the inertial samples beside them in the file have another clock
+FIELDS = dict.fromkeys(("MagX", "MagY", "MagZ"), 0.1)  # milligauss, without logged units; others are in ours
+FEWEST = 0.01  # an instance with a smaller share of the messages is damage
+SET_S = 10.0  # messages further than this from the inertial samples next to them use another clock
 
 
 @dataclass(frozen=True, slots=True)
 class _Format:
-    """What an FMT record says of a type of message."""
+    """The format of a message type, from its FMT record."""
 
     name: str
     length: int
@@ -48,7 +48,7 @@ class Records:
     """Records of one kind, of one instance.
 
     name : of the message, with its number if it has one      instance : from 0
-    fields : shape (n,), as they were packed                  offsets : shape (n,), where each begins in the file
+    fields : shape (n,), as packed                            offsets : shape (n,), start of each in the file
     """
 
     name: str
@@ -56,13 +56,18 @@ class Records:
     fields: NDArray[Any]
     offsets: NDArray[np.intp]
 
+    @classmethod
+    def none(cls, name: str) -> "Records":
+        """No record of a message."""
+        return cls(name, 0, np.zeros(0, np.dtype([])), np.zeros(0, np.intp))
+
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the fields."""
         return tuple(self.fields.dtype.names or ())
 
     def where(self, mask: NDArray[np.bool_]) -> "Records":
-        """Those of the records."""
+        """The records selected by `mask`."""
         return replace(self, fields=self.fields[mask], offsets=self.offsets[mask])
 
 
@@ -71,7 +76,7 @@ class DataFlash:
 
     Raises
     ------
-    LogError      one line: a file that cannot be read, or that is no DataFlash log
+    LogError      one line: a file that cannot be read, or is not a DataFlash log
     """
 
     def __init__(self, path: Path) -> None:
@@ -86,13 +91,13 @@ class DataFlash:
         self._formats: dict[int, _Format] = {}
         self._offsets = self._walk()
         if not self._formats:
-            raise LogError(f"{path}: no DataFlash log: no message is defined in its {len(self._raw)} bytes")
+            raise LogError(f"{path}: not a DataFlash log: no message is defined in its {len(self._raw)} bytes")
         self._types = {f.name: kind for kind, f in self._formats.items() if self._offsets[kind]}
         foreign.refuse_sdlog2(path, {f.name: f.columns for f in self._formats.values()})
         self._units = self._logged_units()
 
     def _walk(self) -> dict[int, list[int]]:
-        """Offsets of the records of each type; formats are learnt on the way, bytes that are no record counted."""
+        """Offsets of the records of each type; also collects the formats and counts bytes outside records."""
         raw, end = self._raw, len(self._raw)
         lengths, found = {FMT: FMT_LENGTH}, defaultdict[int, list[int]](list)
         at, bad, first = 0, 0, -1
@@ -101,7 +106,7 @@ class DataFlash:
             after = at + length
             kind, body = raw[at + 2] if length else 0, raw[at + 3 : after]
             follows = length and after <= end and HEADER.startswith(raw[after : after + 2])
-            if follows or (kind == FMT and after <= end and HEADER not in body):  # without it a type would be lost
+            if follows or (kind == FMT and after <= end and HEADER not in body):  # a lost FMT would lose its type
                 if kind == FMT:
                     self._define(body, lengths)
                 found[kind].append(at)
@@ -109,12 +114,12 @@ class DataFlash:
                 continue
             next_at = raw.find(HEADER, at + 1)
             if next_at < 0:
-                self.repairs.append(f"{end - at} bytes at the end are no whole record: left out")
+                self.repairs.append(f"{end - at} bytes at the end are not a complete record: left out")
                 break
             bad, first = bad + next_at - at, at if first < 0 else first
             at = next_at
         if bad:
-            self.repairs.insert(0, f"{bad} bytes that are no whole record left out, first at byte {first}")
+            self.repairs.insert(0, f"{bad} bytes outside complete records left out, first at byte {first}")
         return found
 
     def _define(self, body: bytes, lengths: dict[int, int]) -> None:
@@ -132,7 +137,7 @@ class DataFlash:
             self._formats.setdefault(kind, _Format(name, length, codes, names, dtype))
 
     def _logged_units(self) -> dict[tuple[str, str], float]:
-        """Factor to ours of each (message, column) whose logged unit we know."""
+        """Factor to ours for each (message, column) with a known logged unit."""
         needed = {"UNIT": ("Id", "Label"), "MULT": ("Id", "Mult"), "FMTU": ("FmtType", "UnitIds", "MultIds")}
         found = {name: self.records(name) for name in needed}
         if not all(set(columns) <= set(found[name].columns) for name, columns in needed.items()):
@@ -150,15 +155,15 @@ class DataFlash:
                 of.columns, of.codes, units.decode("latin1"), by.decode("latin1"), strict=False
             ):
                 if (factor := LABELS.get(labels.get(u, ""))) is not None:
-                    scaled = self._codes[code][1] is not None  # by the character of the format already
+                    scaled = self._codes[code][1] is not None  # already by the format character
                     factors[of.name, name] = factor * (1.0 if scaled else multipliers.get(m, 1.0) or 1.0)
         return factors
 
     def records(self, name: str) -> Records:
-        """All records of that name; none where there are none."""
+        """All records of that name."""
         kind = self._types.get(name)
         if kind is None:
-            return Records(name, 0, np.zeros(0, np.dtype([])), np.zeros(0, np.intp))
+            return Records.none(name)
         size, offsets = self._formats[kind].length - 3, np.array(self._offsets[kind], np.intp)
         block = np.frombuffer(self._raw, np.uint8)[offsets[:, None] + np.arange(3, 3 + size)]
         return Records(name, 0, np.ascontiguousarray(block).view(self._formats[kind].dtype)[:, 0], offsets)
@@ -171,18 +176,14 @@ class DataFlash:
         """One column in our units (angles in degrees), shape (n,)."""
         of = self._formats[self._types[records.name]]
         own = self._codes[of.codes[of.columns.index(column)]][1] or 1.0
-        # Divided, as the writer multiplied: 1/0.01 is a whole number, 0.01 is not.
+        # Divide by an integer, as the writer multiplied: 0.01 is not exact.
         with np.errstate(invalid="ignore"):  # damaged bytes may be a signalling NaN
             values = records.fields[column].astype(np.float64) / round(1.0 / own)
         return np.asarray(values * self._units.get((records.name, column), FIELDS.get(column, 1.0)))
 
-    def table(self, records: Records, columns: tuple[str, ...]) -> Array:
-        """Columns in our units, shape (n, m)."""
-        return np.column_stack([self.column(records, column) for column in columns])
-
     @property
     def names(self) -> list[str]:
-        """Of the messages that are there."""
+        """Names of the messages in the log."""
         return sorted(self._types)
 
 
@@ -197,15 +198,15 @@ def instances(name: str, records: Callable[[str], Records], there: Container[str
         which = which[counts >= FEWEST * counts.max()]
         return [replace(every.where(every.fields["I"] == i), instance=int(i)) for i in which]
     names = [(0, name), (0, f"{name}1"), (0, f"{name}_0"), *((i - 1, f"{name}{i}") for i in range(2, 10))]
-    names += [(i, f"{name}_{i}") for i in range(1, 9)]  # as files made from a log spell them
+    names += [(i, f"{name}_{i}") for i in range(1, 9)]  # as in files converted from a log
     found = [replace(records(own), instance=i) for i, own in names if own in there]
     return [r for k, r in enumerate(found) if r.instance not in [other.instance for other in found[:k]]]
 
 
 def own_time_s(records: Records) -> Array | None:
-    """When the messages were logged, or the sample was taken where they say so; None without a clock of the log.
+    """Time of the sample if logged, otherwise of logging; None without a time on the clock of the log.
 
-    ``TimeMS`` beside ``Week`` is the receiver's time of the week; the time aboard is in ``T`` then.
+    With ``Week``, ``TimeMS`` is the receiver's time of week, and ``T`` the time aboard.
     """
     of_week = "Week" in records.columns or ("Time" in records.columns and "NSats" in records.columns)
     clocks = (("SampleUS", 1e6), ("TimeUS", 1e6), (("T", 1e3) if of_week else ("TimeMS", 1e3)))
@@ -217,7 +218,7 @@ def own_time_s(records: Records) -> Array | None:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The log's clock, as the inertial samples show it: their times, and where they are in the file.
+    """The clock of the log: times of the inertial samples, and their places in the file.
 
     t_s : shape (n,)      offsets : shape (n,), increasing
     """
@@ -226,16 +227,16 @@ class Clock:
     offsets: NDArray[np.intp]
 
     def agrees(self, records: Records, t_s: Array) -> bool:
-        """Whether the times of `records` are those of the inertial samples written just before them."""
+        """Whether the times of `records` match those of the inertial samples written just before them."""
         before = np.searchsorted(self.offsets, records.offsets) - 1
         if not np.any(before >= 0):
             return True
         return bool(np.median(np.abs(t_s - self.t_s[before])[before >= 0]) < SET_S)
 
     def by_order(self, records: Records) -> tuple[Array, NDArray[np.bool_]]:
-        """Times of the inertial samples written next, NaN after the last; and which lie in a gap between two of them.
+        """Times of the inertial samples written next, NaN after the last; and which of them follow a gap.
 
-        A message was written after one inertial sample and before the next: by the latter it had arrived.
+        A message was written between two inertial samples, so it had arrived by the second.
         """
         after = np.searchsorted(self.offsets, records.offsets)
         t_s = np.append(self.t_s, np.nan)[after]

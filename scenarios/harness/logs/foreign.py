@@ -1,4 +1,4 @@
-"""What a file is by its first bytes, where its name says something else: one line that says what to do."""
+"""Recognises files with a wrong name by their first bytes: one line says what the file is and what to do."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,8 +10,7 @@ ULOG = b"ULog\x01\x12\x35"
 DATAFLASH = b"\xa3\x95"
 _ULOG, _DATAFLASH = "a ULog file of PX4: name it .ulg", "an ArduPilot DataFlash log: name it .bin"
 _SDLOG2 = (
-    "a log of PX4's old sdlog2 and not ArduPilot's: it cannot be read; PX4 logs in ULog (.ulg) since version 1.6, "
-    "which can"
+    "a log of PX4's old sdlog2, not ArduPilot's: it cannot be read; since version 1.6 PX4 writes ULog (.ulg), which can"
 )
 _BEGINNINGS = (
     (ULOG, _ULOG),
@@ -28,8 +27,8 @@ _BEGINNINGS = (
 )
 _PAGE, _PAGES = "a web page, not a log: the download went wrong", (b"<!doctype", b"<html")
 _TELEMETRY = (
-    "a MAVLink telemetry log (.tlog), which holds what was sent by radio, a few messages a second: "
-    "download the log from the autopilot (.bin or .ulg)"
+    "a MAVLink telemetry log (.tlog), which holds only a few messages a second: download the log from the autopilot "
+    "(.bin or .ulg)"
 )
 _MAVLINK = b"\xfe\xfd"  # how messages of its versions 1 and 2 begin
 _YEAR_US = 365.25 * 86400e6
@@ -37,7 +36,7 @@ _OF_SDLOG2 = {"TIME": ("StartTime",), "SENS": ("BaroPres",), "ATSP": ("RollSP",)
 
 
 def hint(raw: bytes) -> str:
-    """What the file that begins with `raw` is, and what to do with it; empty where it is nothing known."""
+    """What the file that begins with `raw` is, and what to do with it; empty if it is not recognised."""
     if raw.startswith(DATAFLASH):
         return _SDLOG2 if b"StartTime" in raw[:ENOUGH] else _DATAFLASH
     if raw[:ENOUGH].lstrip().lower().startswith(_PAGES):
@@ -52,7 +51,7 @@ def hint(raw: bytes) -> str:
 
 
 def refuse(path: Path, raw: bytes, expected: str) -> None:
-    """Raise LogError where the file at `path` is empty, or of a known kind other than the one `expected`."""
+    """LogError if the file at `path` is empty, or of a known kind other than the one `expected`."""
     if not raw:
         raise LogError(f"{path}: the file is empty, not {expected}")
     found = hint(raw)
@@ -61,9 +60,9 @@ def refuse(path: Path, raw: bytes, expected: str) -> None:
 
 
 def refuse_sdlog2(path: Path, formats: Mapping[str, tuple[str, ...]]) -> None:
-    """Raise LogError where the messages defined, name -> columns, are those of PX4's sdlog2.
+    """LogError if the messages defined, name -> columns, are those of PX4's sdlog2.
 
-    It packs its records as ArduPilot does, but its fields have other names and meanings.
+    It packs records as ArduPilot does, but its fields have other names and meanings.
     """
     if any(formats.get(name, ("",))[0].startswith(first) for name, (first,) in _OF_SDLOG2.items()):
         raise LogError(f"{path}: {_SDLOG2}")

@@ -1,14 +1,15 @@
-"""What became of everything that a log holds: how much of each stream was read, used, and left out, and why.
+"""The ledger of a log: how many samples of each stream were read, used, and left out, and why.
 
 A stream is ``imu``, ``gps``, ``magnetometer``, ``airspeed``, ``barometer`` or ``reference``.  For each one
 
     read = used + everything left out
 
-Readers count what they read and give a reason for whatever they leave out.  What the estimators receive is counted
+Readers count what they read and give a reason for everything they leave out.  What the estimators receive is counted
 separately, so that `Entry.agrees` can compare the two.
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +18,7 @@ STREAMS = ("imu", "gps", "magnetometer", "airspeed", "barometer", "reference")
 
 @dataclass(slots=True)
 class Entry:
-    """One stream: messages or samples in the file, those that estimators are given, and the others by reason."""
+    """One stream: samples in the file, those given to estimators, and the others by reason."""
 
     read: int = 0
     used: int = 0
@@ -30,7 +31,7 @@ class Entry:
 
 
 class Ledger(Mapping[str, Entry]):
-    """The books of one log, by stream; a stream that was never read has no entry."""
+    """The entries of one log by stream; a stream that was never read has none."""
 
     def __init__(self) -> None:
         self._entries: dict[str, Entry] = {}
@@ -49,7 +50,7 @@ class Ledger(Mapping[str, Entry]):
         self._entry(stream).read += n
 
     def leave_out(self, stream: str, n: int, reason: str) -> None:
-        """`n` of those read do not reach the estimators; the `reason` in a few words, none where `n` is 0."""
+        """`n` of those read do not reach the estimators, for this `reason`."""
         if n:
             left_out = self._entry(stream).left_out
             left_out[reason] = left_out.get(reason, 0) + n
@@ -57,6 +58,12 @@ class Ledger(Mapping[str, Entry]):
     def use(self, stream: str, n: int) -> None:
         """`n` of those read reach the estimators."""
         self._entry(stream).used += n
+
+    def without(self, stream: str) -> "Ledger":
+        """A copy without the entry of `stream`."""
+        copy = Ledger()
+        copy._entries = {name: deepcopy(entry) for name, entry in self._entries.items() if name != stream}
+        return copy
 
     def to_json(self) -> dict[str, dict[str, Any]]:
         """As plain data: stream -> read, used, left_out."""

@@ -1,6 +1,6 @@
-"""MATLAB files (up to version 7.2): vectors and matrices, in structures or at the top, by a map or by their names.
+"""MATLAB files (up to version 7.2): vectors and matrices, also in structures, by a column map or by their names.
 
-A column of a matrix is named ``name[0]``, or ``name.Label`` where an array ``name_label`` beside it holds the labels.
+A column of a matrix is named ``name[0]``, or ``name.Label`` if an array ``name_label`` beside it holds the labels.
 Files with the messages of an ArduPilot log are read as such, see `ardupilot_matlab`.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from estimator.interface import Array
-from scenarios.harness.logs import ardupilot_matlab, dataflash, foreign, tabular
+from scenarios.harness.logs import ardupilot_matlab, column_groups, dataflash, foreign, tabular
 from scenarios.harness.logs.checks import Source
 from scenarios.harness.logs.column_map import MAPS, ColumnMap, load, matrix_of
 from scenarios.harness.logs.column_names import automatic
@@ -20,8 +20,8 @@ from scenarios.harness.logs.quantities import Meaning
 from scenarios.harness.logs.recorded import LogError, RecordedLog
 from sim.outside import files, sandbox
 
-LABELS = ("_label", "_labels", "_names", "_header")  # behind the name of a matrix: the array of its columns' names
-WIDEST = 64  # a matrix with more columns is no table
+LABELS = ("_label", "_labels", "_names", "_header")  # appended to the name of a matrix: the array of its column names
+WIDEST = 64  # a matrix with more columns is not a table
 _SAVE = "save it again with save('file.mat', '-v7')"
 _OBJECTS = (
     "save its columns as arrays, for instance with S = table2struct(T, 'ToScalar', true); "
@@ -30,7 +30,7 @@ _OBJECTS = (
 
 
 def read(path: Path, columns: ColumnMap | None = None, imu: int | None = None) -> RecordedLog:
-    """The log at `path`; without `columns`, by the map that comes with the package and fits, or by its names.
+    """The log at `path`; without `columns`, by the shipped map that fits, or by its names.
 
     imu : which inertial unit of an autopilot's messages, from 0; by default the first one
 
@@ -42,41 +42,34 @@ def read(path: Path, columns: ColumnMap | None = None, imu: int | None = None) -
     if columns is None and (messages := ardupilot_matlab.messages(path, _tables(content), content)):
         return dataflash.of_messages(messages, imu)
     if imu is not None:
-        raise LogError(f"{path}: an inertial unit is chosen among the messages of an autopilot, and these are none")
-    if columns is None:
-        columns = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), None)
-    found, columns = _columns(path, content, columns or ColumnMap())
+        raise LogError(f"{path}: --imu chooses an inertial unit of an autopilot's log; this is not one")
+    found, columns = _columns(path, content, columns or _fitting(content))
     return tabular.recorded(found, columns, Source(path, offered=_offered(found)), matrix_of)
 
 
-def groups(path: Path) -> tuple[list[tabular.Group], Source, tuple[str, ...]]:
+def groups(path: Path) -> tuple[list[column_groups.Group], Source, tuple[str, ...]]:
     """Columns of the file by our names, and the source; LogError as `read`."""
     content = _content(path)
-    known = next((known for known in map(load, sorted(MAPS.glob("*.toml"))) if _fits(content, known)), ColumnMap())
-    found, meanings = _columns(path, content, known)
-    made, source = tabular.take(found, meanings, Source(path, offered=_offered(found)), matrix_of)
+    found, meanings = _columns(path, content, _fitting(content))
+    made, source = column_groups.take(found, meanings, Source(path, offered=_offered(found)), matrix_of)
     return made, source, ()
 
 
 def _content(path: Path) -> dict[str, Any]:
-    """The variables of a file; LogError where it cannot be read."""
+    """The variables of a file; LogError if it cannot be read."""
     head = files.head(path, 520, "log")
     if head.startswith(b"MATLAB 7.3") or b"\x89HDF\r\n" in head:
         raise LogError(f"{path}: a MATLAB file of version 7.3 (HDF5): {_SAVE}")
     try:
         content = sandbox.call("scipy.io:loadmat", path, squeeze_me=True)
     except sandbox.TooLong:
-        raise LogError(
-            f"{path}: cannot be read: the MATLAB reader did not come back in {sandbox.LONGEST_S:g} s"
-        ) from None
+        raise LogError(f"{path}: cannot be read: the MATLAB reader took more than {sandbox.LONGEST_S:g} s") from None
     except sandbox.TooLarge as error:
         size, most = files.size(path.stat().st_size), files.size(int(str(error)))
-        raise LogError(
-            f"{path}: {size}, but its content takes more than {most} of memory: damaged, or no log"
-        ) from None
+        raise LogError(f"{path}: {size}, but its content needs more than {most}: damaged, or no log") from None
     except sandbox.Crashed:
         raise LogError(f"{path}: cannot be read: the MATLAB reader crashed on it (the file is damaged)") from None
-    except sandbox.Failed as error:  # scipy raises whatever its parser meets in a file cut off or foreign
+    except sandbox.Failed as error:  # scipy raises many kinds of errors for damaged files
         found = foreign.hint(head) if head else "an empty file"
         if found and not head.startswith(b"MATLAB"):
             raise LogError(f"{path}: not a MATLAB file; this is {found}") from None
@@ -85,14 +78,17 @@ def _content(path: Path) -> dict[str, Any]:
     objects = [name for name, v in content.items() if type(v).__name__ in ("MatlabOpaque", "MatlabFunction")]
     if objects and not any(np.asarray(v).dtype.kind in "fiubV" for n, v in content.items() if n not in objects):
         names = ", ".join(name for name in objects if name != "None") or "it"
-        raise LogError(f"{path}: {names} holds objects of MATLAB (tables, time series, maps): {_OBJECTS}")
+        raise LogError(f"{path}: {names} holds MATLAB objects (tables, time series, maps): {_OBJECTS}")
     return {name: v for name, v in content.items() if name not in objects}
 
 
-def _fits(content: Mapping[str, Any], known: ColumnMap) -> bool:
-    struct = content.get(known.struct)
-    names = getattr(getattr(struct, "dtype", None), "names", None) or ()
-    return bool(known.columns) and set(known.columns) <= set(names)
+def _fitting(content: Mapping[str, Any]) -> ColumnMap:
+    """The shipped map whose structure and columns are in `content`; an empty one if none fits."""
+    for known in map(load, sorted(MAPS.glob("*.toml"))):
+        names = getattr(getattr(content.get(known.struct), "dtype", None), "names", None) or ()
+        if known.columns and set(known.columns) <= set(names):
+            return known
+    return ColumnMap()
 
 
 def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Array]]:
@@ -114,7 +110,7 @@ def _tables(content: Mapping[str, Any]) -> dict[str, dict[str, Array]]:
 
 
 def _labels(name: str, content: Mapping[str, Any]) -> list[str]:
-    """Names of the columns of the matrix `name`, of a cell array or a matrix of characters; none without one."""
+    """Column names of the matrix `name`, from a cell array or a matrix of characters; empty without one."""
     value = next((content[f"{name}{end}"] for end in LABELS if f"{name}{end}" in content), None)
     if value is None or np.asarray(value).dtype.kind not in "UO":
         return []
@@ -123,7 +119,7 @@ def _labels(name: str, content: Mapping[str, Any]) -> list[str]:
 
 
 def _matrix(value: Any, columns: int = 0) -> Array | None:
-    """A matrix of numbers with its rows in order of time, shape (n, `columns`); None for anything else."""
+    """A matrix of numbers with a row per sample, shape (n, `columns`); None for anything else."""
     matrix = np.asarray(value)
     if matrix.dtype.kind not in "fiub" or matrix.ndim not in (1, 2):
         return None
@@ -141,13 +137,13 @@ def _is_struct(value: Any) -> bool:
 
 
 def _columns(path: Path, content: dict[str, Any], how: ColumnMap) -> tuple[dict[str, Array], ColumnMap]:
-    """All columns of numbers by their names, and what they mean."""
+    """All numeric columns by name, and what they mean."""
     at = ""
     for name in filter(None, how.struct.split(".")):
         if name not in content:
             raise LogError(f"{path}: no structure {how.struct!r}; it has {', '.join(content) or 'nothing'}")
         if not _is_struct(content[name]):
-            raise LogError(f"{path}: {name!r} is no structure")
+            raise LogError(f"{path}: {name!r} is not a structure")
         content = {field: content[name][field].item() for field in content[name].dtype.names}
         at = f" of {how.struct}"
     columns = dict(_flat(content))
@@ -159,16 +155,16 @@ def _columns(path: Path, content: dict[str, Any], how: ColumnMap) -> tuple[dict[
         how = replace(how, columns=found, rivals=rivals)
     if not how.columns:
         raise LogError(
-            f"{path}: no column whose name is understood; it has {', '.join(_offered(columns))}: name them in a column "
+            f"{path}: no column name is recognised; it has {', '.join(_offered(columns))}: name them in a column "
             'map (--columns MAP.toml), a column of a matrix as "name[0]"'
         )
     return columns, how
 
 
 def _recognised(columns: Mapping[str, Array]) -> tuple[dict[str, Meaning], dict[str, tuple[str, ...]]]:
-    """Meanings of the columns by their names, matrix by matrix: each has its own clock.
+    """Meanings of the columns by their names, matrix by matrix, as each has its own times.
 
-    A name counts with that of its structure (``imu.gyro[0]``), and where that means nothing alone (``flight.p``).
+    A name is tried with that of its structure (``imu.gyro[0]``), then without it (``flight.p``).
     """
     parts: dict[tuple[str, int], list[str]] = {}
     for name, values in columns.items():
@@ -192,7 +188,7 @@ def _recognised(columns: Mapping[str, Array]) -> tuple[dict[str, Meaning], dict[
 
 
 def _flat(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Array]]:
-    """Vectors, columns of matrices by index and by label, and the same in structures, by dotted names."""
+    """Vectors, and columns of matrices by index and by label; those in structures have dotted names."""
     found: list[tuple[str, Array]] = []
     for name, value in content.items():
         if _is_struct(value):
@@ -216,7 +212,7 @@ def _flat(content: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Array
 
 
 def _offered(columns: Mapping[str, Array]) -> tuple[str, ...]:
-    """Names of the columns in a few words: those of a matrix without labels as one."""
+    """Column names for a message; those of a matrix without labels are summarised."""
     short: dict[str, int] = {}
     for name in columns:
         of = matrix_of(name) if name.endswith("]") else name

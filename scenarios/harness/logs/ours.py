@@ -1,4 +1,4 @@
-"""Our own recordings: what was measured aboard, and the truth beside it."""
+"""Our own recordings: the measurements, with the truth as the reference."""
 
 from pathlib import Path
 from typing import Any
@@ -32,22 +32,19 @@ def read(path: Path) -> RecordedLog:
     if not len(flight.log):
         raise LogError(f"{path}: a flight without a tick")
     rows = _measured_of(flight)
-    air = (rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])
-    has = {"gps": rows["gps_new"], "magnetometer": rows["mag_new"], "airspeed": air}
-    instruments = ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
     ledger = Ledger()
     reference = Reference(_true(flight.log.truth["R_eb"], ledger), "truth", "the true attitude")
     name = path.name if path.is_dir() else path.parent.name
-    known = known_of(flight) if "known" in flight.manifest else _measured(rows)  # in replay what was known in flight
+    known = known_of(flight) if "known" in flight.manifest else _measured(rows)  # replay uses what was known in flight
     known |= calibration_of(flight)
     return RecordedLog(
-        rows, name or path.name, instruments, reference, (), place_of(flight), known, ledger,
+        rows, name or path.name, properties.sensors(rows), reference, (), place_of(flight), known, ledger,
         on_ground=on_ground_of(flight),
     )  # fmt: skip
 
 
 def _measured_of(flight: Flight) -> NDArray[Any]:
-    """The measured rows, without numbers that no instrument reads."""
+    """The measured rows, with impossible numbers as NaN."""
     rows = flight.log.measured.copy()
     for name in rows.dtype.names or ():
         if rows.dtype[name].base.kind == "f":
@@ -56,7 +53,7 @@ def _measured_of(flight: Flight) -> NDArray[Any]:
 
 
 def _true(R_eb: Array, ledger: Ledger) -> Array:
-    """The attitude, NaN where it is no rotation: those are entered in the ledger, the others when they are used."""
+    """The attitude, NaN where it is not a rotation; these are counted in the ledger."""
     found = attitudes.rotations(R_eb)
     lost = int(np.sum(~np.isfinite(found).all(axis=(1, 2))))
     if lost:
@@ -66,19 +63,19 @@ def _true(R_eb: Array, ledger: Ledger) -> Array:
 
 
 def known_of(flight: Flight) -> dict[str, Known]:
-    """What the manifest of a flight says of the instruments aboard."""
+    """What the manifest of a flight says about the instruments."""
     known = flight.manifest.get("known") or {}
     return {name: Known.from_json(entry) for name, entry in known.items()}
 
 
 def calibration_of(flight: Flight) -> dict[str, Known]:
-    """The calibration of the magnetometer that an estimator was given, by the names of its parameters."""
+    """The magnetometer calibration that the estimator was given in flight, by parameter name."""
     given = (flight.manifest.get("config") or {}).get("estimator_params") or {}
     return {n: Known(v, "log", "calibration in flight") for n, v in given.items() if n.startswith("calibration.")}
 
 
 def on_ground_of(flight: Flight) -> ImuSample | None:
-    """The mean inertial sample at rest from before a flight that starts in the air, where there is one."""
+    """The mean inertial sample at rest before a flight that starts in the air, if there is one."""
     sample = flight.manifest.get("on_ground")
     if sample is None:
         return None
@@ -95,7 +92,7 @@ def place_of(flight: Flight) -> tuple[float, float]:
 
 
 def _measured(rows: NDArray[Any]) -> dict[str, Known]:
-    """What the rows of a recording without a record of its instruments say of them: as of any other log."""
+    """What the rows show, for a recording without a record of its instruments."""
     known = properties.measured(rows)
     fixes = rows[rows["gps_new"] > 0]
     if len(fixes):

@@ -1,4 +1,4 @@
-"""What the rows of a log say of the instruments aboard: rates, and whether the receiver has a vertical velocity."""
+"""What the rows of a log say about the instruments: rates, and whether the receiver has a vertical velocity."""
 
 from typing import Any
 
@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from estimator.instruments import Known
 
-MEASURED = ("imu_rate_hz", "gps_rate_hz", "gps_stamped", "gps_vertical_velocity")  # what any log shows by its rows
+CLIMB_M = 5.0  # a receiver reports no vertical velocity if it is 0 while the height changes by more than this
+MEASURED = ("imu_rate_hz", "gps_rate_hz", "gps_stamped", "gps_vertical_velocity")  # can be measured in any log
 
 
 def measured(rows: NDArray[Any]) -> dict[str, Known]:
@@ -29,6 +30,13 @@ def measured(rows: NDArray[Any]) -> dict[str, Known]:
     return known
 
 
+def sensors(rows: NDArray[Any]) -> tuple[str, ...]:
+    """The sensors of which `rows` hold a sample."""
+    air = (rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])
+    has = {"gps": rows["gps_new"], "magnetometer": rows["mag_new"], "airspeed": air}
+    return ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
+
+
 def _rate_hz(step_s: float) -> float:
-    """Of an interval, without the digits that rounding of the times makes."""
+    """The rate for an interval, without the digits that come from rounded times."""
     return float(f"{1.0 / step_s:.6g}") if step_s > 0.0 else 0.0

@@ -1,12 +1,12 @@
-"""What the parameters in a log of PX4 say of the instruments aboard.
+"""What the parameters in a PX4 log say about the instruments.
 
-Initial parameters are those at the beginning of the log; a change counts where it was made before the aeroplane first
-flew, in a log without flight every one.
+Initial parameters are those at the start of the log; a change counts if it was made before the first flight; in a log
+without flight, every change counts.
 
 | parameter | what it means here |
 |-|-|
-| EKF2_DECL_TYPE bit 0 | declination from the world magnetic model at the first fix, else EKF2_MAG_DECL, degrees |
-| EKF2_GPS_DELAY | latency of a fix, ms, where it carries no time at which it was true |
+| EKF2_DECL_TYPE bit 0 | declination from the world magnetic model at the first fix, or EKF2_MAG_DECL, degrees |
+| EKF2_GPS_DELAY | latency of a fix without a time of validity, ms |
 | SYS_HAS_MAG, EKF2_MAG_TYPE | 0, 5: no magnetometer is used |
 | SYS_HAS_NUM_ASPD, FW_USE_AIRSPD, FW_ARSP_MODE, CBRK_AIRSPD_CHK | 0, 0, 1 or 2, 162128: no airspeed is used |
 """
@@ -34,21 +34,21 @@ def parameters(
 
 
 def off(values: Mapping[str, float], what: str) -> str:
-    """Why the ``airspeed`` or the ``magnetometer`` is not used, in the words of its parameter; empty where it is."""
+    """The parameter that switches the ``airspeed`` or ``magnetometer`` off; empty if it is in use."""
     switches = _NO_AIRSPEED if what == "airspeed" else _NO_COMPASS
     found = (name for name, those in switches.items() if values.get(name) in those)
     return next((f"{name} is {values[name]:g}" for name in found), "")
 
 
 def latency(values: Mapping[str, float]) -> Known | None:
-    """How late a fix is."""
+    """The latency of a fix."""
     delay_ms = values.get("EKF2_GPS_DELAY", math.nan)
     believed = 0.0 <= delay_ms <= LONGEST_DELAY_MS
     return Known(1e-3 * float(delay_ms), "log", "EKF2_GPS_DELAY") if believed else None
 
 
 def declination(values: Mapping[str, float], place: tuple[float, float, float] | None, year: float) -> Known | None:
-    """The declination as EKF2 finds it; a log without its parameters tells none.
+    """The declination as EKF2 determines it; None if the log lacks the parameters.
 
     place : of the first fix: latitude and longitude, degrees, and altitude, or None      year : NaN if unknown
     """

@@ -11,13 +11,15 @@ from estimator.instruments import Known
 from estimator.interface import Array, ImuSample
 from scenarios.harness.logs.ledger import Ledger
 
+Kind = Literal["truth", "filter", "firmware"]
+
 
 class LogError(ValueError):
-    """A log that cannot be read or believed; one line that names the file, the line or row, and the column."""
+    """A log that cannot be read or is implausible; one line that names the file, the line or row, and the column."""
 
 
 class NothingToScore(LogError):
-    """A reference none of which can be used at the times of a log: the log is replayed, and nothing judged.
+    """A reference without an attitude at the times of the log: the log is replayed, and nothing is judged.
 
     read : attitudes in the reference      reason : why they are left out, in a few words
     """
@@ -32,12 +34,12 @@ class Reference:
     """The attitude that a log is scored against.
 
     R_eb : shape (N, 3, 3), at the times of the rows, NaN where unknown
-    kind : "truth", the output of another "filter", or of the original "firmware"      name : in a few words
-    why_none : one line, where nothing of it can be used
+    kind : "truth", the output of another "filter", or of the original "firmware"      name : for display
+    why_none : why none of it can be used, one line; empty if some can
     """
 
     R_eb: Array
-    kind: Literal["truth", "filter", "firmware"]
+    kind: Kind
     name: str
     why_none: str = ""
 
@@ -52,19 +54,19 @@ class RecordedLog:
     """A log ready for replay.
 
     rows : shape (N,), MEASURED_DTYPE, times increasing
-    name : of the file            instruments : those that the log has
+    name : of the file            sensors : those that the log has samples of
     reference : or None           repairs : what was repaired and how often, a line each
-    place : latitude and longitude of the origin of positions, degrees, where known
-    known : what the log says of the instruments aboard, by the names of `estimator.instruments.PROPERTIES`, and of
-            parameters that single estimators have
-    ledger : what became of everything that the file holds
-    notes : what else is worth saying of it, a line each
-    on_ground : mean inertial sample at rest from before the log, where it begins in the air and holds one
+    place : latitude and longitude of the origin of positions, degrees, if known
+    known : what the log says about the instruments, by the names of `estimator.instruments.PROPERTIES`, and about
+            parameters of single estimators
+    ledger : how many samples of the file were read, used and left out
+    notes : further remarks, a line each
+    on_ground : mean inertial sample at rest before the log, if the log starts in the air and holds one
     """
 
     rows: NDArray[Any]
     name: str
-    instruments: tuple[str, ...]
+    sensors: tuple[str, ...]
     reference: Reference | None = None
     repairs: tuple[str, ...] = ()
     place: tuple[float, float] | None = None

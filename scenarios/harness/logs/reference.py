@@ -1,12 +1,12 @@
-"""Reference vectors: synthetic sensor input (``*_in.csv.gz``), and an attitude for each of its rows to compare with.
+"""Reference vectors: synthetic sensor input (``*_in.csv.gz``) with a reference attitude for each row.
 
 The input has a row per inertial sample in SI units, earth north-east-down, body forward-right-down: time of the end
 of the interval, its length, mean rate and specific force, GPS velocity and position where a fix arrived, magnetic
 field in counts where a sample arrived, airspeed.  The attitudes (``*_truth``, or what the original firmware printed)
 are the nine elements of the body-to-earth rotation, row by row.
 
-What the input was made with, and how an original was set for the output that it is compared with, is known by the
-names of the files, and goes to the estimators that have such a parameter (`RecordedLog.known`).
+How the input was made, and how the original firmware was configured, is known from the file names and goes to the
+estimators that have such a parameter (`RecordedLog.known`).
 """
 
 import csv
@@ -22,26 +22,26 @@ from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs import accounts, properties
 from scenarios.harness.logs.ledger import Ledger
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
-from scenarios.harness.logs.text_table import LARGEST
-from scenarios.harness.logs.validity import usable
+from scenarios.harness.logs.text_table import unpacked
+from scenarios.harness.logs.validity import latest, usable
 from sim.outside import files
 
 COUNT_UT = 0.1  # one count of the magnetometer: a field of 500 counts is about the earth's 50 uT
 LEAST_FIX = 3  # a fix of three dimensions
 INPUT = ("t", "dt", "gx", "gy", "gz", "ax", "ay", "az", "gps_new", "gps_vn", "gps_ve", "gps_vd", "gps_fix",
          "mag_new", "mx", "my", "mz", "airspeed", "gps_n", "gps_e", "gps_d")  # fmt: skip
-KNOWN = {  # by the name of the set: its receiver does not filter, but it may be late; E100 has none
+KNOWN = {  # by the name of the set: receivers without a filter, some with latency; E100 has no receiver
     "A50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.0},
     "C50": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.4},
     "C40": {"declination_rad": math.radians(10.0), "gps_filter_s": 0.0, "gps_latency_s": 0.25},
 }
-SETTINGS: dict[str, dict[str, Any]] = {  # of the originals, by the end of the name of their output
+SETTINGS: dict[str, dict[str, Any]] = {  # of the original firmware, by the end of the name of its output
     "_ap2013_gps": {"quirks": "JULY_2013", "use_magnetometer": False},
     "_ap2013_mag": {"quirks": "JULY_2013"},
     "_ap2013_mag_nogps_copter": {"quirks": "JULY_2013", "fly_forward": 0.0},
     "_mp_gpscent": {"centrifugal_from_gps": 1.0, "keep_tilt": 0.0},
 }
-AP2013_STEPS = {  # that original got whole centimetres a second, hundredths of a degree, and counts
+AP2013_STEPS = {  # resolution of the inputs of that firmware
     "gps_v_e_m_s": 0.01,
     "gps_speed_m_s": 0.01,
     "gps_course_rad": math.radians(0.01),
@@ -56,7 +56,7 @@ def is_reference(path: Path) -> bool:
 
 
 def read(path: Path, reference: Path | None = None) -> RecordedLog:
-    """The input at `path`, with the attitudes of the file `reference`; without, the ``*_truth`` beside it, if any.
+    """The input at `path` with the attitudes in `reference`, by default in the ``*_truth`` file beside it, if any.
 
     Raises
     ------
@@ -77,17 +77,13 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     rows["gps_new"], rows["gps_valid"] = fixes, usable(fixes, table["t"], reported & lost)
     rows["gps_v_e_m_s"] = velocity
     rows["gps_p_e_m"] = _held(_vector(table, "gps_n", "gps_e", "gps_d"), fixes)
-    rows["gps_t_s"] = np.nan  # when a fix was true is not in the file
+    rows["gps_t_s"] = np.nan  # the time of validity is not in the file
     rows["gps_speed_m_s"] = np.hypot(velocity[:, 0], velocity[:, 1])
     rows["gps_course_rad"] = np.arctan2(velocity[:, 1], velocity[:, 0]) % (2.0 * np.pi)
     rows["mag_new"] = table["mag_new"] > 0.0
     rows["mag_b_ut"] = _held(COUNT_UT * _vector(table, "mx", "my", "mz"), rows["mag_new"] > 0)
-    flown_through_air = bool(np.any(table["airspeed"] != 0.0))
-    rows["air_new"], rows["airspeed_m_s"] = flown_through_air, table["airspeed"]
+    rows["air_new"], rows["airspeed_m_s"] = bool(np.any(table["airspeed"] != 0.0)), table["airspeed"]
     rows["baro_height_m"] = np.nan
-    instruments = ["gyro", "accelerometer"]
-    instruments += [name for name, has in (("gps", fixes), ("magnetometer", rows["mag_new"])) if np.any(has)]
-    instruments += ["airspeed"] if flown_through_air else []
     attitudes = _reference(path, reference, table["t"])
     if attitudes is not None and "_ap2013_" in attitudes.name:
         for column, step in AP2013_STEPS.items():
@@ -95,11 +91,11 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     known = {**properties.measured(rows), **_known(path, attitudes)}
     if fixes.any():
         known["gps_stamped"] = Known(False, "log", "no stamps of fixes")
-    return RecordedLog(rows, path.name, tuple(instruments), attitudes, known=known, ledger=ledger)
+    return RecordedLog(rows, path.name, properties.sensors(rows), attitudes, known=known, ledger=ledger)
 
 
 def _known(path: Path, attitudes: Reference | None) -> dict[str, Known]:
-    """What is known of the set of `path`, and of the original that printed the `attitudes`."""
+    """What is known of the set of `path` and of the firmware that printed the `attitudes`."""
     known: dict[str, Any] = dict(KNOWN.get(path.name.partition("_")[0], {}))
     for end, settings in SETTINGS.items():
         if attitudes is not None and attitudes.name.endswith(end):
@@ -122,11 +118,7 @@ def _reference(path: Path, reference: Path | None, t_s: Array) -> Reference | No
 
 def _table(path: Path, wanted: tuple[str, ...]) -> dict[str, Array]:
     """Columns of a file of comma-separated numbers, packed or not."""
-    raw = files.unpacked(path, files.read(path, "table of reference vectors", LARGEST))
-    if len(raw) > LARGEST:
-        raise LogError(f"{path}: {files.size(len(raw))} of text, more than the {files.size(LARGEST)} that can be read")
-    text = raw.decode()
-    lines = csv.reader(text.splitlines())
+    lines = csv.reader(unpacked(path, "table of reference vectors").decode().splitlines())
     header = next(lines, [])
     missing = [name for name in wanted if name not in header]
     if missing:
@@ -147,7 +139,7 @@ def _number(cell: str, where: str, name: str) -> float:
     try:
         return float(cell)
     except ValueError:
-        raise LogError(f"{where} {name}: {cell!r} is no number") from None
+        raise LogError(f"{where} {name}: {cell!r} is not a number") from None
 
 
 def _vector(table: dict[str, Array], *names: str) -> Array:
@@ -156,5 +148,5 @@ def _vector(table: dict[str, Array], *names: str) -> Array:
 
 def _held(values: Array, new: NDArray[np.bool_]) -> Array:
     """`values` where `new`, held until the next, zero before the first."""
-    last = np.maximum.accumulate(np.where(new, np.arange(len(values)), -1))
+    last = latest(new)
     return np.where(last[:, None] >= 0, values[last], 0.0)

@@ -1,11 +1,10 @@
-"""Attitudes in a file of their own, to score a log against: a table, a MATLAB file, a recording, another log.
+"""Reference attitudes in a separate file: a table, a MATLAB file, a recording or another log.
 
-They pass through the same repairs as a log: units of time and angle, order, repeated times, rows without a number.
-Their times must be on the clock of the log; in another unit they are found out by comparing the two spans.
+They are repaired like a log: units of time and angle, order, repeated times, rows without a number.  Their times must
+be on the clock of the log; a different unit is found by comparing the two time spans.
 """
 
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +12,11 @@ from numpy.typing import NDArray
 from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.interface import Array
 from scenarios.harness.logs import accounts, attitudes, checks
+from scenarios.harness.logs.column_groups import Group
 from scenarios.harness.logs.ledger import Ledger
-from scenarios.harness.logs.recorded import LogError, NothingToScore, RecordedLog, Reference
-from scenarios.harness.logs.tabular import Group
+from scenarios.harness.logs.recorded import Kind, LogError, NothingToScore, RecordedLog, Reference
 
 _UNITS = ((1.0, "seconds"), (1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
-Kind = Literal["truth", "filter", "firmware"]
 
 
 def of_table(
@@ -30,8 +28,8 @@ def of_table(
 
     Raises
     ------
-    LogError      no time and attitude in it, a clock that runs back; one line
-    NothingToScore      none of its attitudes is at a time of the log
+    LogError      no time or attitude in it, or a clock that runs back; one line
+    NothingToScore      no attitude at the times of the log
     """
     found = next((g for g in groups if attitudes.form_of(g.table) and g.has("time")), None)
     R_eb = attitudes.attitude(found.table) if found else None
@@ -65,12 +63,12 @@ def of_table(
     found_R_eb = attitudes.at_times(t_s[keep], R_eb[keep], rows_s)
     if not np.isfinite(found_R_eb).any():
         if len(keep) == 1:
-            line = f"{path}: one attitude alone, at {first:.10g} s: there is none to interpolate to"
+            line = f"{path}: a single attitude, at {first:.10g} s, cannot be interpolated"
             raise NothingToScore(line, int(read.sum()), "alone")
         usual_s = float(np.median(np.diff(t_s[keep])))
         raise NothingToScore(
-            f"{path}: its {len(keep)} attitudes are {usual_s:.3g} s apart; they are interpolated where they are at "
-            f"most {LONGEST_GAP_S:g} s apart, and no row of the log lies there",
+            f"{path}: its {len(keep)} attitudes are {usual_s:.3g} s apart; those at most {LONGEST_GAP_S:g} s apart are "
+            "interpolated, and no row of the log lies between two of these",
             int(read.sum()),
             "too far apart",
         )
@@ -78,17 +76,17 @@ def of_table(
 
 
 def _elsewhere(path: Path, first_s: float, last_s: float, rows_s: Array, read: int) -> NothingToScore:
-    """The reference is of another time, or on another clock: nobody guesses by how much."""
+    """The reference is from another time or on another clock; the offset is not guessed."""
     return NothingToScore(
         f"{path}: its times, {first_s:.10g} to {last_s:.10g} s, do not overlap those of the log, {rows_s[0]:.10g} to "
-        f"{rows_s[-1]:.10g} s: put both on one clock",
+        f"{rows_s[-1]:.10g} s: both must use one clock",
         read,
         accounts.OUTSIDE,
     )
 
 
 def _in_order(t_s: Array, known: NDArray[np.intp], source: checks.Source, repairs: list[str]) -> NDArray[np.intp]:
-    """`known` in order of time, where no time is there twice: two flights in one file would share some."""
+    """`known` in order of time if no time occurs twice: two flights in one file would share some."""
     times = t_s[known]
     late = int(np.sum(np.diff(times) < 0.0))
     if not late or len(np.unique(times)) < len(times):
@@ -98,9 +96,9 @@ def _in_order(t_s: Array, known: NDArray[np.intp], source: checks.Source, repair
 
 
 def _factor(t_s: Array, rows_s: Array, source: checks.Source, repairs: list[str]) -> float:
-    """Factor to seconds: of the first unit in which the spans overlap and attitudes are near enough to each other.
+    """Factor to seconds: the first unit in which the spans overlap and the attitudes are close enough in time.
 
-    A record that begins at zero overlaps in any unit: then it is in the one in which it can be interpolated.
+    A record that begins at zero overlaps in any unit; then the unit in which it can be interpolated counts.
     """
     t_s = t_s[np.isfinite(t_s)]
     if not len(t_s):
@@ -111,7 +109,7 @@ def _factor(t_s: Array, rows_s: Array, source: checks.Source, repairs: list[str]
         first, last = factor * float(t_s.min()), factor * float(t_s.max())
         if min(last, rows_s[-1]) <= max(first, rows_s[0]):
             continue
-        # Times of another clock may overlap in a unit that is not theirs: then they are far too dense and too short.
+        # Times of another clock may overlap in a wrong unit, but then they are far too dense and too short.
         if factor == 1.0 or (factor * step_s > 1.0 / checks.FASTEST_HZ and last - first > 0.1 * length_s):
             found.append((factor, name))
     near = [unit for unit in found if unit[0] * step_s <= LONGEST_GAP_S]
@@ -122,7 +120,7 @@ def _factor(t_s: Array, rows_s: Array, source: checks.Source, repairs: list[str]
 
 
 def of_log(path: Path, other: RecordedLog, rows_s: Array, ledger: Ledger) -> tuple[Array, Kind]:
-    """The attitude of another log or recording at the times `rows_s`; LogError where it has none or at other times."""
+    """The attitude of another log or recording at the times `rows_s`; LogError if it has none at these times."""
     if other.reference is None:
         raise LogError(f"{path}: no attitude in it")
     t_s, known = other.rows["t_s"], other.reference.known
@@ -134,11 +132,11 @@ def of_log(path: Path, other: RecordedLog, rows_s: Array, ledger: Ledger) -> tup
     outside = (t_s < rows_s[0] - LONGEST_GAP_S) | (t_s > rows_s[-1] + LONGEST_GAP_S)
     good = accounts.samples(ledger, "reference", np.ones(len(t_s), np.bool_), [(outside, accounts.OUTSIDE)])
     ledger.use("reference", int(good.sum()))
-    if np.array_equal(t_s, rows_s):  # its own rows: nothing to interpolate
+    if np.array_equal(t_s, rows_s):  # the same rows: nothing to interpolate
         return R_eb, other.reference.kind
     return attitudes.at_times(t_s, R_eb, rows_s), other.reference.kind
 
 
 def reference(R_eb: Array, kind: Kind, path: Path) -> Reference:
-    """The attitude of a file of its own, by the name of the file."""
+    """The attitude of a separate file, named after it."""
     return Reference(R_eb, "truth" if "_truth." in path.name else kind, path.name)

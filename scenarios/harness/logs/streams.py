@@ -1,14 +1,14 @@
-"""From the messages of an autopilot's log, each kind with times of its own, to rows at the times of the inertial unit.
+"""From the messages of an autopilot's log to rows at the times of the inertial unit.
 
-Whatever else was logged is put into the tick in which it arrived, the first whose end is not before its time, and
-held from there on; of several that arrived in one tick the last one counts.  What arrived while no inertial samples
-were logged is left out: in the next row it would pass for new.  Every message is accounted for in the ledger.
+Each kind of message has its own times.  A message goes into the row in which it arrived, the first whose time is not
+before its own, and is held from there on; of several in one row the last one counts.  Messages that arrived in a gap
+of the inertial samples are left out, because the next row would take them for new.  The ledger counts every message.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pymap3d  # type: ignore[import-untyped]
@@ -18,24 +18,23 @@ from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
-from scenarios.harness.logs import checks, gaps, tabular
+from scenarios.harness.logs import attitudes, checks, gaps, properties
 from scenarios.harness.logs.accounts import NO_FIX as NO_FIX
 from scenarios.harness.logs.accounts import NO_NUMBER, REPEATED
 from scenarios.harness.logs.ledger import Ledger
-from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
+from scenarios.harness.logs.properties import CLIMB_M
+from scenarios.harness.logs.quantities import INERTIAL
+from scenarios.harness.logs.recorded import Kind, LogError, RecordedLog, Reference
 from scenarios.harness.logs.validity import usable
 from sim.outside import files
 
-Kind = Literal["truth", "filter"]  # of an attitude, see `Reference`
-SLOWEST_S = 0.1  # an inertial unit logged more slowly is not to be integrated
-CLIMB_M = 5.0  # a receiver whose height changed by more than this, at no vertical velocity, does not report one
-FEW = 0.01  # a share of the fixes below this is damage
+SLOWEST_S = 0.1  # samples further apart cannot be integrated
+FEW = 0.01  # a smaller share of the fixes is damage
 FAR = "at a time far from its neighbours"
 OUTSIDE, IN_GAP = "outside the inertial record", "in a gap of the inertial record"
 REPLACED = "replaced by a later one in the same row"
 UNHEALTHY = "unhealthy"
 NO_ATTITUDE, NO_ROW, ALONE = "no attitude", "no inertial sample beside it", "no other attitude within 0.5 s"
-_BY_NAME = ("gyro.x", "gyro.y", "gyro.z", "force.x", "force.y", "force.z")
 _HAS = {"gps": "gps_new", "magnetometer": "mag_new", "airspeed": "air_new"}
 
 
@@ -44,9 +43,9 @@ class Stream:
     """Messages of one kind.
 
     name : in the log      t_s : shape (n,), by the clock aboard      values : shape (n, m)
-    why : shape (n,), why the log itself says that a message is not to be used, empty where it does not
-    optional : how many of the last columns may be without a number
-    lost : shape (n,), messages which say that the last one no longer holds, or None
+    why : shape (n,), the reason in the log for not using a message, empty if there is none
+    optional : how many of the last columns may be NaN
+    lost : shape (n,), messages which say that the fix is lost, or None
     """
 
     name: str
@@ -58,11 +57,11 @@ class Stream:
 
     @classmethod
     def of(cls, name: str, t_s: Array, values: Array) -> "Stream":
-        """Messages all of which may be used; numbers that no instrument reads are none, see `files.measured`."""
+        """Messages all of which may be used; impossible numbers become NaN, see `files.measured`."""
         return cls(name, files.measured(t_s), files.measured(values), np.full(len(t_s), "", object))
 
     def without(self, where: NDArray[np.bool_], reason: str) -> "Stream":
-        """The same, without those messages `where`, unless there was a reason before."""
+        """The same stream with a `reason` not to use the messages `where`; earlier reasons stay."""
         why = self.why.copy()
         why[np.asarray(where) & (why == "")] = reason
         return replace(self, why=why)
@@ -70,14 +69,14 @@ class Stream:
 
 @dataclass(frozen=True, slots=True)
 class Messages:
-    """What an autopilot logged, in our units; None where it did not.
+    """What an autopilot logged, in our units; None for what it did not log.
 
-    inertial : gyro x y z, specific force x y z      dt_s : shape (n,), its intervals, NaN where not logged
+    inertial : gyro x y z, specific force x y z      dt_s : shape (n,), its intervals, NaN if not logged
     names : our names of the columns of `inertial` -> those of the log
-    fixes : latitude, longitude (degrees), altitude, velocity north east down, time at which it was true (or NaN)
+    fixes : latitude, longitude (degrees), altitude, velocity north east down, time of validity (or NaN)
     magnetic : field, x y z, microtesla              airspeed, height : one column each
     attitude : R_eb row by row, nine columns         kind : of the attitude
-    known : what the log says of the instruments     remedy : how to log the inertial unit fast enough
+    known : what the log says about the instruments  remedy : how to log the inertial unit fast enough
     """
 
     inertial: Stream
@@ -89,12 +88,28 @@ class Messages:
     height: Stream | None = None
     attitude: Stream | None = None
     kind: Kind = "filter"
-    known: Mapping[str, Known] = field(default_factory=dict)
+    known: Mapping[str, Known | None] = field(default_factory=dict)
     remedy: str = ""
 
 
+def switched_off(stream: Stream, sensor: str, why: str) -> tuple[Stream, dict[str, Known | None]]:
+    """A stream of a `sensor` that a parameter switches off: all of it left out, and ``use_...`` known to be false."""
+    off = stream.without(np.ones(len(stream.t_s), np.bool_), why)
+    return off, {f"use_{sensor}": Known(False, "log", why.partition(" ")[0])}
+
+
+def first_known(logged: Iterable[tuple[Stream, Kind]]) -> tuple[Stream | None, Kind]:
+    """The first of the attitudes `logged` that has a number; if none has, the first one; if there is none, None."""
+    first: tuple[Stream | None, Kind] = None, "filter"
+    for stream, kind in logged:
+        if np.isfinite(stream.values).all(axis=1).any():
+            return stream, kind
+        first = first if first[0] else (stream, kind)
+    return first
+
+
 def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
-    """The log that the messages make, put in order and judged.
+    """The log made of the messages, in order and checked.
 
     Raises
     ------
@@ -111,11 +126,10 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
         rows["airspeed_m_s"] = np.nan_to_num(airspeed[:, 0])
     height = ticks.put("barometer", messages.height, None)
     rows["baro_height_m"] = np.nan if height is None else height[:, 0]
-    instruments = ("gyro", "accelerometer", *(name for name, new in _HAS.items() if rows[new].any()))
     reference = _reference(path, messages, rows["t_s"], after_gap, books)
-    log = RecordedLog(
-        rows, path.name, instruments, reference, tuple(repairs), place, {**known, **messages.known}, books.ledger
-    )
+    known |= {name: entry for name, entry in messages.known.items() if entry is not None}
+    sensors = properties.sensors(rows)
+    log = RecordedLog(rows, path.name, sensors, reference, tuple(repairs), place, known, books.ledger)
     log = checks.judged(log, source, books.ledger)
     for stream, new in _HAS.items():
         if stream in log.ledger:
@@ -126,13 +140,13 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
 
 @dataclass(frozen=True, slots=True)
 class _Books:
-    """Where is written down what was left out and what was repaired."""
+    """The records of what was left out and what was repaired."""
 
     ledger: Ledger
     repairs: list[str]
 
     def open(self, name: str, stream: Stream) -> NDArray[np.bool_]:
-        """Enter a stream of the log: all that was read, and what is left out for what it says itself; the others."""
+        """Enter a stream: messages read, and those left out for a reason in the log; returns the others."""
         self.ledger.read(name, len(stream.t_s))
         for reason, n in zip(*np.unique(stream.why.astype(str), return_counts=True), strict=True):
             if reason:
@@ -140,14 +154,14 @@ class _Books:
         return np.asarray(stream.why == "")
 
     def leave_out(self, name: str, good: NDArray[np.bool_], where: NDArray[np.bool_], reason: str) -> int:
-        """Take those `where` out of the `good` ones of a stream, in place; returns how many."""
+        """Remove those `where` from the `good` ones of a stream, in place; returns how many."""
         n = int(np.sum(good & where))
         self.ledger.leave_out(name, n, reason)
         good &= ~where
         return n
 
     def leave_out_far(self, name: str, good: NDArray[np.bool_], stream: Stream) -> None:
-        """Take out messages whose time is far from those about them."""
+        """Leave out messages whose time is far from those around them."""
         at = np.flatnonzero(np.isfinite(stream.t_s))
         wild = np.zeros(len(stream.t_s), np.bool_)
         wild[at] = _wild(stream.t_s[at])
@@ -157,9 +171,10 @@ class _Books:
 
 
 def _wild(t_s: Array) -> NDArray[np.bool_]:
-    """Messages whose time is far from the median of the five about them: damaged ones, two at most in five.
+    """Damaged messages, at most two in five: their time is far from the median of the five around them.
 
-    Times that increase are their own median, next to a gap too; a clock that was set stays, and is refused later.
+    Increasing times equal their median, even next to a gap.  A clock that was set is not removed here: it is rejected
+    later.
     """
     if len(t_s) < 3:
         return np.zeros(len(t_s), np.bool_)
@@ -168,14 +183,14 @@ def _wild(t_s: Array) -> NDArray[np.bool_]:
 
 
 def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[Any], checks.Source, NDArray[np.bool_]]:
-    """Rows with the inertial samples alone, how the log names a place in it, and rows before which samples miss."""
+    """Rows with the inertial samples, how the log names a place in it, and the rows after a gap."""
     stream = messages.inertial
     good = books.open("imu", stream)
     books.leave_out_far("imu", good, stream)
     number = np.flatnonzero(good) + 1
     source = checks.Source(path, messages.names, lambda k: f"{stream.name} {number[k]}")
     stream = replace(stream, t_s=stream.t_s[good], values=stream.values[good])
-    by_name = dict(zip(_BY_NAME, stream.values.T, strict=True))
+    by_name = dict(zip(INERTIAL, stream.values.T, strict=True))
     keep = checks.kept(stream.t_s, by_name, source, books.repairs, books.ledger)
     rows = np.zeros(len(keep), MEASURED_DTYPE)
     rows["t_s"] = stream.t_s[keep]
@@ -191,30 +206,30 @@ def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[An
 
 
 def _intervals(t_s: Array, dt_s: Array, name: str, repairs: list[str]) -> Array:
-    """Intervals as logged, NaN where the one before was not logged: then the row stands for the time since."""
-    told = (dt_s >= checks.SHORTEST_S) & (dt_s <= LONGEST_GAP_S)
-    if not told.any():
+    """Intervals as logged; NaN after a sample that was not logged: then the row covers the time since the last one."""
+    logged = (dt_s >= checks.SHORTEST_S) & (dt_s <= LONGEST_GAP_S)
+    if not logged.any():
         return np.full(len(t_s), np.nan)
-    usual_s, steps = float(np.median(dt_s[told])), np.diff(t_s)
+    usual_s, steps = float(np.median(dt_s[logged])), np.diff(t_s)
     if np.median(steps) > gaps.LONG * usual_s:
         repairs.append(
             f"{name}: means over {1e3 * usual_s:g} ms logged every {1e3 * np.median(steps):g} ms; "
-            "each stands for the time since the one before"
+            "each is taken for the time since the one before"
         )
         return np.full(len(t_s), np.nan)
-    missing = gaps.missing(t_s, np.where(told, dt_s, usual_s))
-    return np.where(told & ~missing, dt_s, np.nan)
+    missing = gaps.missing(t_s, np.where(logged, dt_s, usual_s))
+    return np.where(logged & ~missing, dt_s, np.nan)
 
 
 class _Ticks:
-    """The rows, into which messages are put as they arrived."""
+    """The rows, and messages put into them as they arrived."""
 
     def __init__(self, rows: NDArray[Any], after_gap: NDArray[np.bool_], books: _Books) -> None:
         self.rows, self.after_gap, self.books = rows, after_gap, books
         self.most_s = gaps.LONG * float(np.median(np.diff(rows["t_s"])))  # from arrival to the end of the tick
 
     def placed(self, name: str, stream: Stream) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Messages that count, by their number in the stream, and the row of each; in order of time."""
+        """Messages that are used, by their number in the stream, and the row of each; in order of time."""
         books, t_s, rows_s = self.books, stream.t_s, self.rows["t_s"]
         good = books.open(name, stream)
         needed = stream.values[:, : stream.values.shape[1] - stream.optional]
@@ -237,7 +252,7 @@ class _Ticks:
         return kept[last], at[kept[last]]
 
     def put(self, name: str, stream: Stream | None, new: str | None) -> Array | None:
-        """Mark where messages arrive in the column `new`; their values held, shape (N, m), NaN before the first."""
+        """Mark arrivals in the column `new`; returns the values, held, shape (N, m), NaN before the first."""
         if stream is None:
             return None
         message, at = self.placed(name, stream)
@@ -252,7 +267,7 @@ class _Ticks:
 
 
 def _put_fixes(ticks: _Ticks, fixes: Stream | None, known: dict[str, Known]) -> tuple[float, float] | None:
-    """Fill the GPS columns, and what they tell of the receiver; the place of the first fix, the origin of positions."""
+    """Fill the GPS columns and `known` of the receiver; returns the first fix, the origin of positions."""
     rows = ticks.rows
     held = ticks.put("gps", fixes, "gps_new")
     new = rows["gps_new"] > 0
@@ -280,7 +295,7 @@ def _put_fixes(ticks: _Ticks, fixes: Stream | None, known: dict[str, Known]) -> 
 
 
 def _holds(rows: NDArray[Any], fixes: Stream) -> NDArray[np.bool_]:
-    """Rows in which the last fix is usable; see `validity`."""
+    """Rows in which the last fix is usable; see `validity.usable`."""
     lost = np.zeros(len(rows), np.bool_)
     if fixes.lost is not None:
         at = np.searchsorted(rows["t_s"], fixes.t_s[fixes.lost & np.isfinite(fixes.t_s)])
@@ -291,7 +306,7 @@ def _holds(rows: NDArray[Any], fixes: Stream) -> NDArray[np.bool_]:
 def _reference(
     path: Path, messages: Messages, t_s: Array, after_gap: NDArray[np.bool_], books: _Books
 ) -> Reference | None:
-    """The attitude at the times of the rows, interpolated; None where none was logged."""
+    """The attitude at the times of the rows, interpolated; None if none was logged."""
     stream = messages.attitude
     if stream is None or not len(stream.t_s):
         return None
@@ -300,12 +315,12 @@ def _reference(
     books.leave_out_far("reference", good, stream)
     times, first = np.unique(stream.t_s[good], return_index=True)
     books.ledger.leave_out("reference", int(good.sum()) - len(times), REPEATED)
-    R_eb = tabular.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
+    R_eb = attitudes.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
     known = np.isfinite(R_eb).all(axis=(1, 2))
     used = np.zeros(len(times), np.bool_)
     if known.any():
         after = np.clip(np.searchsorted(times, t_s[known]), 1, len(times) - 1)
-        used[after] = used[after - 1] = True  # between which an attitude was interpolated
+        used[after] = used[after - 1] = True  # used to interpolate between
     books.ledger.use("reference", int(used.sum()))
     unused = ~used
     near = np.diff(times) <= LONGEST_GAP_S

@@ -1,8 +1,8 @@
-"""From named columns of numbers, as a text or MATLAB file holds them, to rows that estimators take.
+"""From the columns of a text or MATLAB file to the rows that estimators take.
 
-A row of the file is an inertial sample, where it holds one, and may hold reports of other instruments.  Where a MATLAB
-file holds these in matrices of their own, each has its own times; a report is put into the first row whose time is not
-before its own, and of several in one row the last one counts.
+A row of the file is an inertial sample and may also hold reports of other instruments.  If a MATLAB file holds these in
+separate matrices, each has its own times.  A report goes into the first row whose time is not before its own; of
+several in one row the last one counts.
 """
 
 import re
@@ -17,145 +17,21 @@ from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
 from scenarios.harness.logs import accounts, attitudes, checks, fixes, properties
-from scenarios.harness.logs.attitudes import at_times as at_times
-from scenarios.harness.logs.attitudes import attitude as attitude
+from scenarios.harness.logs.column_groups import Group, alone, take
 from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.ledger import Ledger
-from scenarios.harness.logs.quantities import EULER, FIELD, INERTIAL
+from scenarios.harness.logs.properties import CLIMB_M
+from scenarios.harness.logs.quantities import FIELD, INERTIAL
 from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from scenarios.harness.logs.units import COUNTS
-from scenarios.harness.logs.validity import usable
-from sim.outside import files
+from scenarios.harness.logs.validity import latest, usable
 
-Table = dict[str, Array]
-CLIMB_M = 5.0  # a receiver whose height changes by more than this, at no vertical velocity, does not report one
-FEWEST_FORCES = 5  # samples of the gyro for one of the accelerometer, at most
-REMEDY = (
-    "where the axes are forward, left, up: --columns forward-left-up; right, forward, up: --columns right-forward-up; "
-    "where the accelerometer reads gravity minus acceleration: --columns force-reversed; in a map of your own "
-    'axes = "forward-left-up" or force_reversed = true, or a minus sign before the quantity'
-)
-
-
-@dataclass(slots=True)
-class Group:
-    """Columns of one length with times in common, by our names and in our units.
-
-    told : quantities whose unit is given      own : its clock is not that of the inertial unit: no value is held
-    """
-
-    table: Table
-    told: frozenset[str] = frozenset()
-    own: bool = False
-
-    @property
-    def n(self) -> int:
-        """Rows."""
-        return len(next(iter(self.table.values()), ()))
-
-    def has(self, *names: str) -> bool:
-        """Whether all of these quantities are in it."""
-        return all(name in self.table for name in names)
-
-
-def _alone(_column: str) -> str:
-    return ""
-
-
-def take(
-    columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source, of: Callable[[str], str] = _alone
-) -> tuple[list[Group], checks.Source]:
-    """The columns that the map knows, by our names and in our units; and the source, which learns their names.
-
-    of : column -> the matrix or structure that it belongs to
-
-    Raises
-    ------
-    LogError      a column of the map that is not there, or two columns for one quantity
-    """
-    missing = [name for name in meanings.columns if name not in columns]
-    if missing:
-        raise LogError(
-            f"{source.path}: no column {', '.join(missing)}, which the map {meanings.name} names; "
-            f"it has {', '.join(source.offered or columns) or 'none'}"
-        )
-    if meanings.rivals:
-        quantity, names = next(iter(meanings.rivals.items()))
-        raise LogError(
-            f"{source.path}: {quantity} may be {' or '.join(names)}: say which in a column map (--columns MAP.toml)"
-        )
-    parts: dict[tuple[str, int], dict[str, Array]] = {}
-    told: dict[tuple[str, int], set[str]] = {}
-    own: dict[str, str] = {}
-    for name, m in meanings.columns.items():
-        values = files.measured(columns[name])
-        part = (of(name), len(values))
-        table = parts.setdefault(part, {})
-        if m.quantity in table:
-            raise LogError(f"{source.path}: {m.quantity} is the meaning of two columns, {own[m.quantity]} and {name}")
-        # Without an offset nothing is subtracted: a number in our unit stays bit for bit.
-        if m.quantity == "time":
-            values = checks.unwrapped(values)
-        table[m.quantity] = m.factor * (values - m.offset) if m.offset else m.factor * values
-        told.setdefault(part, set()).update({m.quantity} if m.told else ())
-        own.setdefault(m.quantity, name)
-    for vector in ("gyro", "force", "mag"):
-        own[vector] = " ".join(own[name] for name in (f"{vector}.{a}" for a in "xyz") if name in own) or vector
-    groups = _with_times({key: Group(table, frozenset(told[key])) for key, table in parts.items()}, source)
-    for group in groups:
-        turn(group, meanings)
-        if not group.told & set(EULER):
-            attitudes.mend_angles(group.table, source)
-    return groups, replace(source, columns=own, remedy=REMEDY)
-
-
-def _with_times(parts: Mapping[tuple[str, int], Group], source: checks.Source) -> list[Group]:
-    """One group for each clock: columns without a time of their own join those of the same length that have one."""
-    lengths = {n for (_, n), part in parts.items() if part.has("time")}
-    for (_, n), part in parts.items():
-        if n not in lengths and part.has("gps.time"):  # the one clock that these columns have
-            part.table["time"] = part.table.pop("gps.time")
-            part.told |= {"time"} & {q.replace("gps.time", "time") for q in part.told}
-        if n not in lengths and part.has("interval", "gyro.x"):  # a log that times its rows by their lengths
-            part.table["time"] = np.cumsum(np.nan_to_num(part.table["interval"]))
-            part.told |= {"time"}
-    groups = {key: part for key, part in parts.items() if part.has("time")}
-    for key, part in parts.items():
-        if key in groups:
-            continue
-        same = [group for (_, n), group in groups.items() if n == key[1]]
-        if not same:
-            what = f"{key[0]} " if key[0] else ""
-            if groups:
-                raise LogError(
-                    f"{source.path}: {what}({key[1]} rows: {', '.join(part.table)}) has no time: name a column of this "
-                    'length as "time" in the column map'
-                )
-            groups[key] = part
-            continue
-        for quantity, values in part.table.items():
-            if quantity in same[0].table:
-                raise LogError(f"{source.path}: {quantity} is the meaning of two columns")
-            same[0].table[quantity] = values
-        same[0].told |= part.told
-    return list(groups.values())
-
-
-def turn(group: Group, meanings: ColumnMap) -> None:
-    """Axes of the body, and the sign of a specific force, as the map says."""
-    table, R_bs = group.table, meanings.R_bs
-    if meanings.force_reversed:
-        for name in INERTIAL[3:]:
-            if name in table:
-                table[name] = -table[name]
-    for names in (INERTIAL[:3], INERTIAL[3:], FIELD):
-        if R_bs is not None and group.has(*names):
-            table.update(zip(names, R_bs @ np.array([table[name] for name in names]), strict=True))
+FEWEST_FORCES = 5  # at most this many gyro samples for each accelerometer sample
 
 
 @dataclass(slots=True)
 class _Making:
-    """A log being made: its rows, what is known, the ledger and the repairs."""
+    """A log under construction: its rows, what is known, the ledger and the repairs."""
 
     rows: NDArray[Any]
     ledger: Ledger
@@ -165,9 +41,9 @@ class _Making:
 
 
 def recorded(
-    columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source, of: Callable[[str], str] = _alone
+    columns: Mapping[str, Array], meanings: ColumnMap, source: checks.Source, of: Callable[[str], str] = alone
 ) -> RecordedLog:
-    """The log that the columns hold, checked.
+    """The log in the columns, checked.
 
     Raises
     ------
@@ -180,7 +56,7 @@ def recorded(
     factor = checks.clock_factor(main.table["time"], source, repairs)
     for group in groups:
         for name in ("time", "interval", "gps.time"):
-            if name in group.table and (group is main or name not in group.told):
+            if name in group.table and (group is main or name not in group.units_given):
                 group.table[name] = factor * group.table[name]
     t_s, numbers = main.table["time"], np.column_stack([main.table[name] for name in INERTIAL])
     inertial = np.flatnonzero(~others)
@@ -194,27 +70,23 @@ def recorded(
     rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(numbers[keep], 2)
     rows["baro_height_m"] = np.nan
     for group in groups:
-        order = np.argsort(group.table["time"], kind="stable")  # what has no time comes last
+        order = np.argsort(group.table["time"], kind="stable")  # samples without a time come last
         in_order = {name: values[order] for name, values in group.table.items()}
-        group = Group(in_order, group.told, group is not main)
+        group = Group(in_order, group.units_given, group is not main)
         _take_fixes(made, group)
         _take_field(made, group)
         _take_air(made, group)
     reference = _take_attitude(made, groups, main, keep, source, meanings)
     known = {**properties.measured(rows), **made.known, **meanings.known}
-    has_air = bool(np.any((rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])))
-    has = {"gps": rows["gps_new"].any(), "magnetometer": rows["mag_new"].any(), "airspeed": has_air}
-    instruments = ("gyro", "accelerometer", *(name for name, there in has.items() if there))
-    place = meanings.origin_deg or made.place
     log = RecordedLog(
-        rows, source.path.name, instruments, reference, tuple(repairs), place, known, made.ledger,
-        notes=_stamps_first(meanings, known, rows), on_ground=meanings.on_ground,
+        rows, source.path.name, properties.sensors(rows), reference, tuple(repairs), meanings.origin_deg or made.place,
+        known, made.ledger, _stamps_first(meanings, known, rows), meanings.on_ground,
     )  # fmt: skip
     return checks.judged(log, source)
 
 
 def _stamps_first(meanings: ColumnMap, known: Mapping[str, Known], rows: NDArray[Any]) -> tuple[str, ...]:
-    """A line where the map names a latency of the receiver, but the fixes have stamps and these come first."""
+    """A line if the map gives a latency of the receiver but the fixes have stamps, which take precedence."""
     latency, stamped = meanings.known.get("gps_latency_s"), known.get("gps_stamped")
     if latency is None or latency.source == "withheld" or "gps_stamped" in meanings.known:
         return ()
@@ -223,13 +95,13 @@ def _stamps_first(meanings: ColumnMap, known: Mapping[str, Known], rows: NDArray
     fixes = rows[rows["gps_new"] > 0]
     late_s = float(np.nanmedian(fixes["t_s"] - fixes["gps_t_s"]))
     return (
-        f"gps_latency_s = {latency.value:g} s in the map is for fixes without a time stamp: those of gps.time are "
-        f"{late_s:.3g} s late; gps_stamped = false in the map, or --set gps_latency_s, lets it hold for all",
+        f"gps_latency_s = {latency.value:g} s in the map applies to fixes without a time stamp; by gps.time "
+        f"these are {late_s:.3g} s late. To apply it anyway: gps_stamped = false in the map, or --set gps_latency_s",
     )
 
 
 def _main(groups: list[Group], source: checks.Source) -> Group:
-    """The group with the gyro, and the accelerometer at its times; LogError where something is missing."""
+    """The group with the gyro, with the accelerometer at its times; LogError if something is missing."""
     main = next((g for g in groups if g.has(*INERTIAL[:3])), None)
     force = next((g for g in groups if g.has(*INERTIAL[3:])), None)
     if main is not None and force is not None and main is not force and main.has("time"):
@@ -248,7 +120,7 @@ def _main(groups: list[Group], source: checks.Source) -> Group:
 
 
 def _counts(offered: tuple[str, ...], missing: str) -> str:
-    """What to write for a column that counts, whose unit only its maker knows."""
+    """What to write for a column in counts, whose unit the file does not give."""
     for name in offered:
         inside = re.search(r"[(\[]\s*([^)\]]+?)\s*[)\]]", name)
         if inside and inside[1].lower() in COUNTS:
@@ -257,7 +129,7 @@ def _counts(offered: tuple[str, ...], missing: str) -> str:
 
 
 def _meet(main: Group, repairs: list[str]) -> NDArray[np.bool_]:
-    """Bring the accelerometer to the times of the gyro, where the two stand in rows of their own; which are its."""
+    """Interpolate an accelerometer in rows of its own to the times of the gyro; returns these rows."""
     gyro, force = (np.isfinite([main.table[n] for n in names]).all(axis=0) for names in (INERTIAL[:3], INERTIAL[3:]))
     if 2 * np.sum(gyro & force) >= np.sum(gyro) or np.sum(force) * FEWEST_FORCES < np.sum(gyro):
         return np.zeros(main.n, np.bool_)
@@ -270,7 +142,7 @@ def _meet(main: Group, repairs: list[str]) -> NDArray[np.bool_]:
 
 
 def _of_others(main: Group) -> NDArray[np.bool_]:
-    """Rows of other instruments: without an inertial reading, but with one that most inertial rows do not have."""
+    """Rows of other instruments: no inertial reading, but one that most inertial rows do not have."""
     none = ~np.isfinite([main.table[name] for name in INERTIAL]).any(axis=0)
     others = np.zeros(main.n, np.bool_)
     if none.any() and not none.all():
@@ -296,14 +168,14 @@ def interpolated(t_s: Array, times: Array, values: Array) -> Array:
 
 
 def _intervals(main: Group, keep: NDArray[np.intp], repairs: list[str]) -> Array:
-    """Intervals that the file holds; NaN where there are none, or where they cannot be those between its rows."""
+    """Intervals in the file; NaN if there are none, or if they do not fit the times of the rows."""
     if not main.has("interval"):
         return np.full(len(keep), np.nan)
     said = main.table["interval"][keep]
     steps = np.diff(main.table["time"][keep])
     usual, between = np.nanmedian(said) if np.isfinite(said).any() else 0.0, np.median(steps) if len(steps) else 0.0
     if not 0.8 * between <= usual <= 1.25 * between:
-        repairs.append(f"intervals of {usual:g} s are not those between the rows, {between:g} s: not used")
+        repairs.append(f"intervals of {usual:g} s do not fit the rows, which are {between:g} s apart: not used")
         return np.full(len(keep), np.nan)
     return np.where(said > 0.0, said, np.nan)
 
@@ -311,7 +183,7 @@ def _intervals(main: Group, keep: NDArray[np.intp], repairs: list[str]) -> Array
 def _put(
     made: _Making, stream: str, t_s: Array, read: NDArray[np.bool_], why: list[tuple[NDArray[np.bool_], str]]
 ) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:
-    """Rows in which a sample of the `stream` arrives, and for each row the last sample so far, -1 before the first."""
+    """Rows in which a sample of the `stream` arrives, and the last sample up to each row, -1 before the first."""
     rows_s = made.rows["t_s"]
     at = np.searchsorted(rows_s, t_s)
     why = [
@@ -321,7 +193,7 @@ def _put(
     good = accounts.samples(made.ledger, stream, read, why)
     index = np.flatnonzero(good)
     last = np.full(len(rows_s), -1)
-    last[at[index]] = index  # of several the last one stays
+    last[at[index]] = index  # the last one of several
     new = last >= 0
     made.ledger.leave_out(stream, len(index) - int(new.sum()), accounts.IN_ONE_ROW)
     made.ledger.use(stream, int(new.sum()))
@@ -337,7 +209,7 @@ def _held(values: Array, last: NDArray[np.intp], before: float = 0.0) -> Array:
 def _take_fixes(made: _Making, group: Group) -> None:
     """Fill the GPS columns."""
     rows, table, t_s = made.rows, group.table, group.table["time"]
-    found = fixes.reports(table, group.told, made.repairs, each=group.own)
+    found = fixes.reports(table, group.units_given, made.repairs, each=group.own)
     if found is None:
         return
     new, last = _put(made, "gps", t_s, found.read, found.reasons)
@@ -346,9 +218,8 @@ def _take_fixes(made: _Making, group: Group) -> None:
     made.place = made.place or found.place
     rows["gps_new"] = new
     position = found.values[:, :3]
-    known = np.isfinite(position).all(axis=1) & ~found.lost  # a report without a position leaves that of the one before
-    kept = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
-    rows["gps_p_e_m"] = _held(_held(position, kept), last)
+    known = np.isfinite(position).all(axis=1) & ~found.lost  # without a position the last one holds
+    rows["gps_p_e_m"] = _held(_held(position, latest(known)), last)
     velocity = _held(found.values[:, 3:8], last)
     rows["gps_v_e_m_s"], rows["gps_speed_m_s"], rows["gps_course_rad"] = velocity[:, :3], velocity[:, 3], velocity[:, 4]
     stamps = _held(found.values[:, 8], last, np.nan)
@@ -359,8 +230,8 @@ def _take_fixes(made: _Making, group: Group) -> None:
     made.known["gps_stamped"] = Known(stamped, "log", "stamps of the fixes" if stamped else "no stamps of fixes")
 
 
-def _reports_vertical(table: Table, rows: NDArray[Any]) -> Known:
-    """Whether the receiver reports a vertical velocity: one that is 0 while the height changes is none."""
+def _reports_vertical(table: Mapping[str, Array], rows: NDArray[Any]) -> Known:
+    """Whether the receiver reports a vertical velocity: not if it is 0 while the height changes."""
     if "gps.vd" not in table:
         return Known(False, "log", "no column of it")
     fixes = rows[rows["gps_new"] > 0]
@@ -370,9 +241,9 @@ def _reports_vertical(table: Table, rows: NDArray[Any]) -> Known:
 
 
 def _valid(
-    table: Table, t_s: Array, lost: NDArray[np.bool_], new: NDArray[np.bool_], rows_s: Array
+    table: Mapping[str, Array], t_s: Array, lost: NDArray[np.bool_], new: NDArray[np.bool_], rows_s: Array
 ) -> NDArray[np.bool_]:
-    """Rows in which the last fix is usable: as the file says, else see `usable`."""
+    """Rows in which the last fix is usable: as the file says, otherwise see `usable`."""
     if "gps.valid" in table:
         said = np.flatnonzero(np.isfinite(table["gps.valid"]) & np.isfinite(t_s))
         before = np.searchsorted(t_s[said], rows_s, side="right") - 1
@@ -384,7 +255,7 @@ def _valid(
 
 
 def _take_field(made: _Making, group: Group) -> None:
-    """Fill the magnetometer's columns; without ``mag.new`` a sample arrives where its values change."""
+    """Fill the magnetometer's columns; without ``mag.new`` a change of its values is a sample."""
     if not group.has(*FIELD):
         return
     field_ut = np.column_stack([group.table[name] for name in FIELD])
@@ -413,7 +284,7 @@ def _take_air(made: _Making, group: Group) -> None:
         flag = next((name for name in flags if name in table), None)
         there = np.isfinite(table[quantity])
         read = there if flag is None else table[flag] > 0.0
-        if flag == "air.new":  # of the other of the two where this one has no number
+        if flag == "air.new":  # for the other one, if this one has no number
             other = table.get("height" if quantity == "airspeed" else "airspeed", np.full(group.n, np.nan))
             read = read & (there | ~np.isfinite(other))
         new, last = _put(made, stream, table["time"], np.asarray(read), [(~there, accounts.NO_NUMBER)])
@@ -428,7 +299,7 @@ def _take_air(made: _Making, group: Group) -> None:
 def _take_attitude(
     made: _Making, groups: list[Group], main: Group, keep: NDArray[np.intp], source: checks.Source, meanings: ColumnMap
 ) -> Reference | None:
-    """The attitude in the file, at the times of the rows; interpolated where it stands between them."""
+    """The attitude in the file at the times of the rows, interpolated between its samples."""
     group = next((g for g in groups if attitudes.form_of(g.table)), None)
     if group is None:
         return None
@@ -445,7 +316,7 @@ def _take_attitude(
         why.append((elsewhere & np.isin(t_s, rows_s), accounts.REPEATED))
     between = ~np.isfinite(R_eb).all(axis=(1, 2))
     if between.any():
-        R_eb[between] = at_times(t_s, R_all, rows_s[between])
+        R_eb[between] = attitudes.at_times(t_s, R_all, rows_s[between])
     beyond = ~((t_s >= rows_s[0] - LONGEST_GAP_S) & (t_s <= rows_s[-1] + LONGEST_GAP_S))
     good = accounts.samples(made.ledger, "reference", read, [*why, (beyond, accounts.OUTSIDE)])
     made.ledger.use("reference", int(good.sum()))

@@ -1,9 +1,9 @@
-"""Logs that are text in columns with a header of names, packed (.gz) or not: by a column map or by their names."""
+"""Logs as text in columns, packed (.gz) or not; the columns are identified by a column map or by their names."""
 
 from dataclasses import replace
 from pathlib import Path
 
-from scenarios.harness.logs import tabular, text_table
+from scenarios.harness.logs import column_groups, tabular, text_table
 from scenarios.harness.logs.checks import Source
 from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.recorded import LogError, RecordedLog
@@ -25,10 +25,10 @@ def read(path: Path, columns: ColumnMap | None = None) -> RecordedLog:
     return replace(log, repairs=(*table.notes, *log.repairs))
 
 
-def groups(path: Path, columns: ColumnMap | None = None) -> tuple[list[tabular.Group], Source, tuple[str, ...]]:
-    """Columns of the file by our names, the source, and what was found out about the file; LogError as `read`."""
+def groups(path: Path, columns: ColumnMap | None = None) -> tuple[list[column_groups.Group], Source, tuple[str, ...]]:
+    """Columns of the file by our names, the source, and notes on the file; LogError as `read`."""
     table = text_table.read(path, columns or ColumnMap())
-    found, source = tabular.take(table.columns, table.meanings, _found(table, path))
+    found, source = column_groups.take(table.columns, table.meanings, _found(table, path))
     return found, source, table.notes
 
 
@@ -36,7 +36,6 @@ def _found(table: text_table.TextTable, path: Path) -> Source:
     if not table.meanings.columns:
         names = ", ".join(table.header)
         raise LogError(
-            f"{path}: no column whose name is understood; it has {names}: "
-            "name them in a column map (--columns MAP.toml)"
+            f"{path}: no column name is recognised; it has {names}: name them in a column map (--columns MAP.toml)"
         )
     return Source(path, row=lambda k: f"line {table.lines[k]}", offered=table.header)

@@ -1,16 +1,17 @@
 """PX4's logs (.ulg), read with pyulog: sensor_combined or vehicle_imu, GPS, magnetometer, air data, attitude.
 
-PX4's axes are ours: forward, right, down against north, east, down; its quaternions are w, x, y, z from body to earth.
-Where the simulator's attitude was logged (vehicle_attitude_groundtruth) it is the truth, else vehicle_attitude is
-what was flown on.  Until 2017 the magnetometer and the barometer were in sensor_combined.
+PX4's axes are ours: body forward, right, down and earth north, east, down; its quaternions are w, x, y, z from body to
+earth.  The reference is the simulator's attitude (vehicle_attitude_groundtruth) if it was logged, otherwise
+vehicle_attitude, which the aeroplane was flown on.  Until 2017 the magnetometer and the barometer were in
+sensor_combined.
 
-A fix was true at its ``timestamp_sample``, unless that is 0 or less than 10 ms before its arrival: drivers that do not
-know it fill in the time of arrival.
+A fix was valid at its ``timestamp_sample``, unless that is 0 or less than 10 ms before its arrival: drivers that do not
+know the time of validity fill in the time of arrival.
 """
 
 import contextlib
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,10 @@ from numpy.typing import NDArray
 
 from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import foreign, px4, streams, tabular
+from scenarios.harness.logs import attitudes, foreign, px4, streams
 from scenarios.harness.logs.ardupilot import FLYING_M_S
-from scenarios.harness.logs.recorded import LogError, RecordedLog
-from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Kind, Stream
+from scenarios.harness.logs.recorded import Kind, LogError, RecordedLog
+from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Stream
 from scenarios.harness.logs.ulog_bytes import whole
 from sim.outside import files
 
@@ -36,8 +37,8 @@ TOPICS = [
 ]  # fmt: skip
 FIX_3D = 3
 GAUSS_UT = 100.0
-NOT_THERE = 0x7FFFFFFF  # sensor_combined.*_timestamp_relative of a sensor without a sample
-SOONEST_S, LATEST_S = 0.01, 2.0  # a fix arrives no sooner after it was true; and no later
+NOT_THERE = 0x7FFFFFFF  # in sensor_combined.*_timestamp_relative: no sample
+SOONEST_S, LATEST_S = 0.01, 2.0  # a fix arrives at least and at most so long after its validity
 NO_VELOCITY, NOT_MEASURED = "no velocity (vel_ned_valid is 0)", "not measured: from ground speed and wind"
 Topic = Mapping[str, NDArray[Any]]
 
@@ -58,7 +59,7 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
     field, compass = _switched(log, "magnetometer", _field(log))
     airspeed, pitot = _switched(log, "airspeed", _airspeed(log))
     height = _height(log)
-    attitude = _attitude(log)
+    attitude = streams.first_known(_attitudes(log))
     notes = (f"only one of several instances is read: {'; '.join(log.others)}",) if log.others else ()
     messages = streams.Messages(
         inertial, dt_s, names, fixes, field, airspeed, height, *attitude,
@@ -68,7 +69,7 @@ def read(path: Path, imu: int | None = None) -> RecordedLog:
 
 
 class _Log:
-    """The topics of a log by name and instance, and its parameters; `others` lists what was read of several."""
+    """The topics of a log by name and instance, and its parameters; `others` lists which of several was read."""
 
     def __init__(self, path: Path, repairs: list[str]) -> None:
         try:
@@ -84,11 +85,11 @@ class _Log:
                 self._log = ULog(io.BytesIO(clean), TOPICS)
         except LogError:
             raise
-        except Exception as error:  # pyulog raises whatever its parser meets in a file that is none or damaged
+        except Exception as error:  # pyulog raises many kinds of errors for damaged files
             raise LogError(f"{path}: cannot be read as a ULog file: {' '.join(str(error).split())}") from error
         self.topics: dict[tuple[str, int], Topic] = {}
         for topic in self._log.data_list:
-            if "timestamp" not in topic.data:  # pyulog reads nothing behind its first message
+            if "timestamp" not in topic.data:  # pyulog stops after its first message
                 raise LogError(f"{path}: the definition of topic {topic.name} has no timestamp: it is damaged")
             self.topics.setdefault((topic.name, topic.multi_id), topic.data)
         self.others = list[str]()
@@ -101,7 +102,7 @@ class _Log:
             repairs.append(f"{len(self._log.dropouts)} times the logger could not follow, for {lost_s:.2f} s in all")
 
     def _first_flight_us(self) -> float:
-        """When the aeroplane first flew by GPS; infinite where it did not."""
+        """When the aeroplane first flew, by GPS; infinite if it did not."""
         for name in ("vehicle_gps_position", "sensor_gps"):
             topic = self.topics.get((name, 0), {})
             if {"vel_n_m_s", "vel_e_m_s", "fix_type"} <= set(topic):
@@ -112,18 +113,18 @@ class _Log:
         return np.inf
 
     def first(self, *names: str) -> tuple[str, Topic] | None:
-        """The lowest instance of the first of these topics that is there."""
+        """The lowest instance of the first of these topics in the log."""
         for name in names:
             if instances := self.instances(name):
                 return name, self.topics[name, self.one(name, instances[0])]
         return None
 
     def instances(self, name: str) -> list[int]:
-        """Those of a topic that are there."""
+        """The instances of a topic in the log."""
         return sorted(i for n, i in self.topics if n == name)
 
     def one(self, name: str, chosen: int) -> int:
-        """Note that the other instances of the topic are not read."""
+        """`chosen`, with a note that the other instances of the topic are not read."""
         if len(there := self.instances(name)) > 1:
             self.others.append(f"{name} {chosen} (of {', '.join(map(str, there))})")
         return chosen
@@ -133,7 +134,7 @@ class _Log:
 
         Raises
         ------
-        LogError      a field that is not there
+        LogError      a field is missing
         """
         missing = [field for field in fields if field not in topic]
         if missing:
@@ -151,7 +152,7 @@ def _published_s(topic: Topic) -> Array:
 
 
 def _sampled_s(topic: Topic) -> Array:
-    """When the sample was taken, where the topic has that, else when it was published."""
+    """When the sample was taken, or, if the topic does not say, when it was published."""
     sampled = topic.get("timestamp_sample")
     return _published_s(topic) if sampled is None else np.where(sampled > 0, sampled / 1e6, _published_s(topic))
 
@@ -188,13 +189,11 @@ def _inertial(log: _Log, imu: int | None) -> tuple[Stream, Array, dict[str, str]
     return Stream.of(name, t_s, values), dt_s, names
 
 
-def _fixes(log: _Log) -> tuple[Stream | None, dict[str, Known]]:
-    """Fixes, in degrees and metres, or as whole numbers 1e-7 degrees and mm; what is known of the receiver."""
+def _fixes(log: _Log) -> tuple[Stream | None, dict[str, Known | None]]:
+    """The fixes, and what is known of the receiver.  Integer positions are in 1e-7 degrees and millimetres."""
     found = log.first("vehicle_gps_position", "sensor_gps")
     if found is None:
-        return None, {
-            name: k for name, k in {"declination_rad": px4.declination(log.parameters, None, 0.0)}.items() if k
-        }
+        return None, {"declination_rad": px4.declination(log.parameters, None, 0.0)}
     name, topic = found
     if "latitude_deg" in topic:
         place = log.columns(name, topic, "latitude_deg", "longitude_deg", "altitude_msl_m")
@@ -212,16 +211,15 @@ def _fixes(log: _Log) -> tuple[Stream | None, dict[str, Known]]:
     usable = np.flatnonzero((stream.why == "") & (np.abs(place) <= (90.0, 180.0, 1e5)).all(axis=1))
     latitude, longitude, altitude = place[usable[0]].tolist() if len(usable) else (0.0, 0.0, 0.0)
     where = (latitude, longitude, altitude) if len(usable) else None
-    known = {
+    return stream, {
         "gps_vertical_velocity": Known(False, "log", f"{name}.vel_d_m_s") if level else None,
         "gps_latency_s": px4.latency(log.parameters),
         "declination_rad": px4.declination(log.parameters, where, _year(topic)),
     }
-    return stream, {name: value for name, value in known.items() if value is not None}
 
 
 def _true_s(topic: Topic) -> Array:
-    """When each fix was true, NaN where its stamp is none; see the module."""
+    """Time of validity of each fix, NaN if unknown; see the module."""
     sampled_us = topic.get("timestamp_sample")
     if sampled_us is None:
         return np.full(len(topic["timestamp"]), np.nan)
@@ -231,24 +229,22 @@ def _true_s(topic: Topic) -> Array:
 
 
 def _year(topic: Topic) -> float:
-    """Decimal year of the fixes, NaN where none has a date."""
+    """Decimal year of the fixes, NaN if none has a date."""
     utc_us = topic.get("time_utc_usec", np.zeros(0))
     dated = utc_us[utc_us > 0]
     return 1970.0 + float(np.median(dated)) / (365.2425 * 86400e6) if len(dated) else float("nan")
 
 
-def _switched(log: _Log, what: str, stream: Stream | None) -> tuple[Stream | None, dict[str, Known]]:
-    """The stream, all of it left out where a parameter says that the sensor is not used; and that it says so."""
+def _switched(log: _Log, what: str, stream: Stream | None) -> tuple[Stream | None, dict[str, Known | None]]:
+    """The stream; if a parameter switches the sensor off, all of it left out, and this fact."""
     off = px4.off(log.parameters, what)
     if stream is None or not off:
         return stream, {}
-    return stream.without(np.ones(len(stream.t_s), np.bool_), off), {
-        f"use_{what}": Known(False, "log", off.partition(" ")[0])
-    }
+    return streams.switched_off(stream, what, off)
 
 
 def _combined(log: _Log, sensor: str, *fields: str) -> Stream | None:
-    """Samples of a sensor that sensor_combined repeats until there is another; None where it has none."""
+    """Samples of a sensor in sensor_combined, which repeats each until the next one; None if it has none."""
     topic, relative = log.topics.get(("sensor_combined", 0)), f"{sensor}_timestamp_relative"
     if topic is None or relative not in topic or not set(fields) <= set(topic):
         return None
@@ -262,7 +258,7 @@ def _combined(log: _Log, sensor: str, *fields: str) -> Stream | None:
 
 
 def _field(log: _Log) -> Stream | None:
-    """The magnetic field: of vehicle_magnetometer, of sensor_combined, or as the sensor gave it."""
+    """The magnetic field: of vehicle_magnetometer, sensor_combined or sensor_mag."""
     combined = _combined(log, "magnetometer", *_each("magnetometer_ga"))
     found = log.first("vehicle_magnetometer", *(() if combined else ("sensor_mag",)))
     if found is None:
@@ -273,7 +269,7 @@ def _field(log: _Log) -> Stream | None:
 
 
 def _airspeed(log: _Log) -> Stream | None:
-    """True airspeed, or indicated where there is none."""
+    """True airspeed, or indicated airspeed if there is none."""
     found = log.first("airspeed", "airspeed_validated")
     if found is None:
         return None
@@ -285,18 +281,14 @@ def _airspeed(log: _Log) -> Stream | None:
     if name != "airspeed_validated":
         confidence = topic.get("confidence", np.zeros(0))
         return stream.without(confidence == 0.0, UNHEALTHY) if np.any(confidence) else stream  # all 0: not filled in
-    for source, first in (
-        ("airspeed_source", 1),
-        ("selected_airspeed_index", 1),
-        ("airspeed_sensor_measurement_valid", 1),
-    ):
-        if source in topic:  # else of the wind triangle, or of a model
-            stream = stream.without(topic[source] < first, NOT_MEASURED)
+    for source in ("airspeed_source", "selected_airspeed_index", "airspeed_sensor_measurement_valid"):
+        if source in topic:  # 0 or less: from the wind triangle or a model
+            stream = stream.without(topic[source] < 1, NOT_MEASURED)
     return stream
 
 
 def _height(log: _Log) -> Stream | None:
-    """Barometric height above where the log begins."""
+    """Barometric height above the start of the log."""
     found = log.first("vehicle_air_data")
     if found is None:
         stream = _combined(log, "baro", "baro_alt_meter")
@@ -306,19 +298,13 @@ def _height(log: _Log) -> Stream | None:
     return stream if stream is None or not len(first) else replace(stream, values=stream.values - first)
 
 
-def _attitude(log: _Log) -> tuple[Stream | None, Kind]:
-    """The true attitude, else the one flown on; where neither has a number, the first one that was logged."""
-    empty: tuple[Stream | None, Kind] = None, "filter"
+def _attitudes(log: _Log) -> Iterator[tuple[Stream, Kind]]:
+    """The true attitude, then the one flown on; see `streams.first_known`."""
     for name, kind in ATTITUDES:
         found = log.first(name)
         if found is None:
             continue
         quaternion = log.columns(name, found[1], *_each("q", 4))
-        R_eb = tabular.attitude(dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)))
-        if R_eb is None:
-            continue
-        attitude = Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9))
-        if np.isfinite(R_eb).any():
-            return attitude, kind
-        empty = empty if empty[0] else (attitude, kind)
-    return empty
+        R_eb = attitudes.attitude(dict(zip(("qw", "qx", "qy", "qz"), quaternion.T, strict=True)))
+        if R_eb is not None:
+            yield Stream.of(name, _sampled_s(found[1]), R_eb.reshape(-1, 9)), kind

@@ -1,8 +1,8 @@
-"""The whole messages of a ULog file, without damaged bytes, in a form that pyulog reads to its end.
+"""The complete messages of a ULog file, without damaged bytes, so that pyulog reads all of them.
 
-A message is a length, a letter and a body.  Any length that two bytes hold is legal: what a body may look like depends
-on its letter, so that damaged bytes are seldom taken for a message.  Where a log was appended to after a crash, its
-flag bits say at which bytes, and the message before each of them may be cut off.
+A message is a length, a letter and a body.  Any two-byte length is legal, so the body is checked by its letter to avoid
+taking damaged bytes for a message.  If a log was appended to after a crash, its flag bits give the offsets, and the
+message before each offset may be cut off.
 """
 
 import struct
@@ -26,15 +26,14 @@ _AFTER_KEY = {PARAMETER: 4, DEFAULT: 4}  # the length of what follows the key
 
 
 def whole(path: Path, raw: bytes, repairs: list[str]) -> bytes:
-    """The log with the messages that the reader needs, all of them whole; bytes that are none are counted.
+    """The log with the complete messages that the reader needs; other bytes are counted.
 
-    A message is believed where another one follows it, or the end, or data that were appended; or where it defines a
-    topic in whole words, without which the topic would be lost.  Data must be of a topic that was announced, and as
-    long as the others of it.
+    A message is accepted if another one, the end or appended data follows it, or if it defines a topic in readable
+    text, since the topic would be lost otherwise.  Data must be of an announced topic and as long as its other data.
 
     Raises
     ------
-    LogError      a log of a kind that came after this reader, by its flags
+    LogError      a newer format, by its flags
     """
     walk = _Walk(raw, _appended(path, raw))
     at, end = HEADER_LENGTH, len(raw)
@@ -49,12 +48,12 @@ def whole(path: Path, raw: bytes, repairs: list[str]) -> bytes:
             parts.append(raw[at:after])
         at = after
     if bad:
-        repairs.append(f"{bad} bytes that are no whole message left out, first at byte {first}")
+        repairs.append(f"{bad} bytes outside complete messages left out, first at byte {first}")
     return b"".join(parts)
 
 
 def _appended(path: Path, raw: bytes) -> list[int]:
-    """Where appended data begin, by the flag bits, which come first if there are any."""
+    """Where appended data begin, by the flag bits, which are the first message if present."""
     at = HEADER_LENGTH
     if len(raw) < at + 3 + FLAGS_LENGTH or raw[at + 2] != FLAGS:
         return []
@@ -67,14 +66,14 @@ def _appended(path: Path, raw: bytes) -> list[int]:
 
 
 class _Walk:
-    """What can be a message, and how long data of each topic are."""
+    """Recognises messages, and keeps the data length of each topic."""
 
     def __init__(self, raw: bytes, appended: list[int]) -> None:
         self.raw, self.end, self.lengths = raw, len(raw), dict[int, int]()  # 0 before the first data of a topic
         self.appended = [place for place in appended if self._looks(place, self.end)]
 
     def after(self, at: int) -> int:
-        """Where the message that begins at `at` ends; 0 where none does that is to be believed."""
+        """The end of the message that begins at `at`; 0 if there is no acceptable message."""
         stop = min((place for place in self.appended if place > at), default=self.end)
         after = self._looks(at, stop)
         if not after or not (self._goes_on(after, stop) or self._defines(at, after)):
@@ -91,7 +90,7 @@ class _Walk:
         return after
 
     def _begins(self, at: int) -> int:
-        """Where a message that began at `at` would end, by its length and its letter alone; 0 where none can begin."""
+        """The end of a message at `at` by its length and letter alone; 0 if none can begin there."""
         raw = self.raw
         if at + 3 > self.end:
             return 0
@@ -100,7 +99,7 @@ class _Walk:
         return at + 3 + length if length >= shortest and (kind not in _FIXED or length == shortest) else 0
 
     def _looks(self, at: int, stop: int) -> int:
-        """Where the message at `at` ends, if its bytes are such as its letter demands and it ends by `stop`; else 0."""
+        """The end of the message at `at` if its bytes fit its letter and it ends by `stop`; otherwise 0."""
         after, raw = self._begins(at), self.raw
         if not after or after > stop:
             return 0
@@ -122,11 +121,11 @@ class _Walk:
         return after
 
     def _goes_on(self, at: int, stop: int) -> bool:
-        """Whether a message begins at `at`, if only a piece of one, or nothing more than a piece is left."""
+        """Whether a message, complete or cut off, begins at `at`, or the data end there."""
         return at + 3 > stop or self._begins(at) > 0
 
     def _defines(self, at: int, after: int) -> bool:
-        """Whether the message defines or announces a topic: printable letters to its end."""
+        """Whether the message defines or announces a topic."""
         return self.raw[at + 2] in (FORMAT, ANNOUNCED) and after - at > 6
 
 

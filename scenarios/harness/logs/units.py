@@ -1,8 +1,8 @@
-"""Units as people spell them, in column maps and in the headers of files.
+"""Spellings of units in column maps and file headers.
 
-Spellings are compared without upper case, blanks and synonyms: ``µT``, ``uT`` and ``microtesla`` are one unit, and so
-are ``m/s²``, ``m/s^2`` and ``m/s/s``.  What a letter stands for depends on the dimension: ``G`` is a gauss for a
-magnetic field and standard gravity for a force.
+Case, blanks and synonyms make no difference: ``µT``, ``uT`` and ``microtesla`` are one unit, and so are ``m/s²``,
+``m/s^2`` and ``m/s/s``.  A letter may depend on the dimension: ``G`` is a gauss for a magnetic field and standard
+gravity for a force.
 """
 
 import re
@@ -13,7 +13,7 @@ import numpy as np
 from estimator.interface import G_M_S2
 
 _DEG, KN_M_S, FT_M, MI_M = np.pi / 180.0, 1852.0 / 3600.0, 0.3048, 1609.344
-COUNTS = ("count", "counts", "lsb", "raw", "adc", "digit", "digits")  # no unit: what one of them is, only a factor says
+COUNTS = ("count", "counts", "lsb", "raw", "adc", "digit", "digits")  # not units: they need a factor
 
 UNITS: dict[str, dict[str, float]] = {  # dimension -> unit -> factor to ours; the first one is ours
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
@@ -58,7 +58,7 @@ _SYNONYMS = (
 
 
 def plain(spelled: str) -> str:
-    """A unit without what makes no difference: upper case, blanks, synonyms."""
+    """A unit with case, blanks and synonyms normalised."""
     unit = spelled.strip().lower()
     for old, new in _SYNONYMS:
         unit = re.sub(old, new, unit)
@@ -76,18 +76,18 @@ _KNOWN = {dimension: _table(dimension) for dimension in UNITS}
 
 
 def factor_of(spelled: str, dimension: str) -> float | None:
-    """Factor from the unit `spelled` to ours; None where the dimension has no such unit."""
+    """Factor from the unit `spelled` to ours; None if the dimension has no such unit."""
     return _KNOWN[dimension].get(plain(spelled))
 
 
 def is_unit(spelled: str) -> bool:
-    """Whether it is a unit of any dimension, or a word for counts."""
+    """Whether `spelled` is a unit of any dimension, or a word for counts."""
     unit = plain(spelled)
     return unit in COUNTS or any(unit in known for known in _KNOWN.values())
 
 
 def _parts(unit: str) -> str:
-    """A unit as it ends a name, in words that are joined by underscores: ``m_s_2``."""
+    """A unit as the end of a name, its words joined by underscores: ``m_s_2``."""
     return "_".join(re.findall(r"[a-z]+|\d+", unit))
 
 
@@ -98,7 +98,7 @@ _ENDINGS: Mapping[str, frozenset[str]] = {
 
 
 def at_end(words: list[str]) -> tuple[str, int]:
-    """The unit that the last of the `words` of a name spell, and how many of them; ``("", 0)`` where they do not."""
+    """The unit in the last `words` of a name, and how many words it takes; ``("", 0)`` if there is none."""
     for n in range(min(4, len(words) - 1), 0, -1):
         found = _ENDINGS.get("_".join(words[-n:]))
         if found:

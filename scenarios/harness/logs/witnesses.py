@@ -1,6 +1,6 @@
-"""What else in a log turns, beside the gyro: pairs of angles that would be equal, were the gyro right.
+"""Witnesses of rotation in a log besides the gyro: pairs of angles that are equal if the gyro is right.
 
-Each witness gives, over successive windows, the angle that it saw and the angle that the gyro says for it.
+Each witness gives, over successive windows, the angle it shows and the angle that follows from the gyro.
 """
 
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ from estimator.interface import Array
 from scenarios.harness.logs.recorded import Reference
 
 WINDOW_S = 0.2  # long enough to rise above the noise, short enough for a small angle
-FLYING_M_S = 5.0  # below, a course says nothing of a turn
-Pair = tuple[Array, Array]  # angles seen, and angles said by the gyro, of one shape
+FLYING_M_S = 5.0  # below this speed the course does not show turns
+Pair = tuple[Array, Array]  # angles shown, and angles from the gyro, of one shape
 
 
 def witnesses(rows: NDArray[Any], reference: Reference | None) -> Iterator[Pair]:
-    """The witnesses that the log has, the best first."""
+    """The witnesses in the log, the best first."""
     n = max(1, round(WINDOW_S / float(np.median(rows["dt_s"]))))
-    turned = np.cumsum(rows["gyro_b_rad_s"] * rows["dt_s"][:, None], axis=0)  # as if always about the same axes
+    turned = np.cumsum(rows["gyro_b_rad_s"] * rows["dt_s"][:, None], axis=0)  # small-angle approximation
     if reference is not None:
         yield _of_reference(reference.R_eb, turned, n)
     measured = np.flatnonzero(rows["mag_new"])
@@ -47,7 +47,7 @@ def _of_reference(R_eb: Array, turned: Array, n: int) -> Pair:
 
 
 def _of_direction(vector_b: Array, turned: Array, at: NDArray[np.intp]) -> Pair:
-    """Turning of something fixed to the earth, seen from the body: dv = v x dtheta."""
+    """Rotation of a vector fixed to the earth, in body axes: dv = v x dtheta."""
     length = np.linalg.norm(vector_b[at], axis=1, keepdims=True)
     v = np.divide(vector_b[at], length, out=np.zeros((len(at), 3)), where=length > 0.0)
     middle = 0.5 * (v[1:] + v[:-1])
@@ -55,7 +55,7 @@ def _of_direction(vector_b: Array, turned: Array, at: NDArray[np.intp]) -> Pair:
 
 
 def _of_course(rows: NDArray[Any], fixes: NDArray[np.intp]) -> Pair:
-    """Turning of the course from fix to fix, and the gyro's about the apparent vertical."""
+    """Change of course from fix to fix, and the gyro's rotation about the apparent vertical."""
     force = rows["force_b_m_s2"]
     length = np.maximum(np.linalg.norm(force, axis=1), 1e-3)
     about_down = -np.sum(rows["gyro_b_rad_s"] * force, axis=1) / length

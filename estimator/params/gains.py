@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimator.interface import Array
-from estimator.premerlani import PremerlaniParams
+from estimator.params.premerlani import PremerlaniParams
 
 PHASE_MARGIN_RAD = math.radians(60.0)  # of a yaw loop that has the receiver's lag in it
 _LATEST, _STEPS = 100.0, 3000  # how far to look for the last crossing, in time constants 1 / (K_P W), in steps
