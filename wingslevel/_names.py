@@ -1,9 +1,12 @@
 """What can be named: scenarios, estimators, autopilots, aircraft, sensor suites; and the parameters of estimators."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from wingslevel._conditions import Estimator
+
+if TYPE_CHECKING:
+    from scenarios.harness.parameters import Parameter
 
 
 def scenarios() -> dict[str, str]:
@@ -21,21 +24,23 @@ def autopilots() -> dict[str, str]:
     return _listed("autopilots")
 
 
-def parameters(estimator: Estimator) -> dict[str, dict[str, Any]]:
-    """The parameters of an estimator: name -> ``{"default": value, "unit": text}``; they go into ``params=``.
+def parameters(estimator: Estimator) -> "dict[str, Parameter]":
+    """The parameters of an estimator by name, as ``params=`` takes them.
+
+    Each has `default`, `unit`, `meaning`, and `raised` and `lowered`: what happens if it is.
 
     Raises
     ------
     WingslevelError     no such estimator
     """
     from scenarios.harness import lent
-    from scenarios.harness.commands.listing import parameters as listed
-    from wingslevel._crew import named, objects, quietly
+    from scenarios.harness.parameters import estimator_parameters
+    from wingslevel._crew import named, objects
+    from wingslevel._errors import one_line
 
     found = named([estimator])
-    with quietly(), lent.lend(objects(found)):
-        (params,) = listed("estimators", list(found)).values()
-    return params
+    with one_line(), lent.lend(objects(found)):
+        return {parameter.name: parameter for parameter in estimator_parameters(next(iter(found)))}
 
 
 def _listed(kind: str, names: Sequence[str] = ()) -> dict[str, str]:

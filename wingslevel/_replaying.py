@@ -47,9 +47,9 @@ class Replay:
         return tuple(self._flights.values())
 
     @property
-    def instruments(self) -> tuple[str, ...]:
-        """The instruments that the log has."""
-        return self._done.log.instruments
+    def sensors(self) -> tuple[str, ...]:
+        """The sensors in the log."""
+        return self._done.log.sensors
 
     @property
     def repairs(self) -> tuple[str, ...]:

@@ -291,8 +291,8 @@ def test_parameters_of_an_estimator_by_name_and_of_a_class() -> None:
     """What `params` takes, with defaults and units."""
     found = wl.parameters("premerlani")
     assert found == wl.parameters(Premerlani)
-    assert found["gps_latency_s"]["unit"] == "s"
-    assert all(wl.fly("crosswind", duration=1, params={name: found[name]["default"]}) for name in ("k_p", "k_i"))
+    assert (found["gps_latency_s"].unit, bool(found["k_p"].meaning)) == ("s", True)
+    assert wl.fly("crosswind", duration=1, params={name: found[name].default for name in ("k_p", "k_i")})
 
 
 def test_help_names_the_options() -> None:
