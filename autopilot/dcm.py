@@ -64,68 +64,68 @@ _NOT_FLOAT: dict[str, Any] = {
     "mode": "i8", "inverted": "i8", "left": "i8", "radio": "i8",
     "rate_b_rad_s": ("f8", (3,)), "route": ("f8", (MOST_WAYPOINTS, 3)),
 }  # fmt: skip
-_ASKED = np.dtype(
+_SETPOINT = np.dtype(
     [*((f.name, _NOT_FLOAT.get(f.name, "f8")) for f in fields(Setpoint)), ("n_waypoints", "i8")], align=True
 )
 _STATE = np.dtype(
     [
-        ("mode", "i8"),  # in force in the last tick, -1 before the first
-        ("asked_mode", "i8"),  # asked for then
-        ("led_by", "i8"),  # the mode that leads the way
-        ("roll_integral", "f8"),  # aileron and elevator held by the integrals
+        ("mode", "i8"),  # active in the last tick, -1 before the first
+        ("setpoint_mode", "i8"),  # of the setpoint in the last tick
+        ("led_by", "i8"),  # mode that determines the course
+        ("roll_integral", "f8"),  # aileron and elevator of the integrators
         ("pitch_integral", "f8"),
-        ("climb_integral_rad", "f8"),  # pitch held by the integral of the climb missing
-        ("throttle_integral", "f8"),  # and throttle by that of the energy missing
-        ("inverted", "i8"),  # flown on its back
-        ("airspeed_m_s", "f8"),  # believed
+        ("climb_integral_rad", "f8"),  # pitch of the integrated climb error
+        ("throttle_integral", "f8"),  # throttle of the integrated energy error
+        ("inverted", "i8"),  # flying inverted
+        ("airspeed_m_s", "f8"),  # best knowledge
         ("airspeed_known", "i8"),  # measured, or from GPS and wind
-        ("air_left_s", "f8"),  # for so long the airspeed last measured is believed
+        ("air_left_s", "f8"),  # remaining time for which the last measured airspeed is used
         ("airspeed_wanted_m_s", "f8"),
-        ("ground_m_s", "f8"),  # speed over the ground, NaN where nobody knows
-        ("headwind_m_s", "f8"),  # against the way to be flown
-        ("unseen_turn_rad", "f8"),  # turned, but not yet in the GPS course
-        ("outbound", "i8"),  # the launch point was passed and is being left behind
+        ("ground_m_s", "f8"),  # speed over the ground, NaN if unknown
+        ("headwind_m_s", "f8"),  # along the desired track
+        ("unseen_turn_rad", "f8"),  # turn not yet visible in the GPS course
+        ("outbound", "i8"),  # flying away from the launch point after passing it
         ("felt_m_s2", "f8"),  # mean acceleration along the nose
-        ("thrown_s", "f8"),  # since the throw, -1 before
-        ("levelled_off", "i8"),  # the climb after the throw is over
+        ("thrown_s", "f8"),  # since the throw, -1 before it
+        ("levelled_off", "i8"),  # the climb after the throw has ended
         ("next_waypoint", "i8"),  # of the route
-        ("on_leg", "i8"),  # on the way to it, from
+        ("on_leg", "i8"),  # flying towards it, from
         ("leg_from_m", "f8", (3,)),  # north, east, height
         ("silent_s", "f8"),  # since the last fix arrived
-        ("heard_s", "f8"),  # since the GPS was silent for long
-        ("circled_s", "f8"),  # time without a position
-        ("low", "i8"),  # too near the ground
-        ("believed", "i8"),  # the estimator
+        ("heard_s", "f8"),  # since the last GPS outage
+        ("circled_s", "f8"),  # in circles without a position
+        ("low", "i8"),  # too close to the ground
+        ("believed", "i8"),  # whether the estimator is trusted
         ("healthy_once", "i8"),
-        ("poor_s", "f8"),  # how long the estimator has been unhealthy, counting down where it is healthy
-        ("R_kept_eb", "f8", (3, 3)),  # attitude of the last healthy estimate, carried on with
-        ("bias_kept_b_rad_s", "f8", (3,)),  # its offset of the gyros
-        ("wind_kept_e_m_s", "f8", (3,)),  # its wind, NaN where it told none
+        ("poor_s", "f8"),  # time the estimator has been unhealthy, decreasing while it is healthy
+        ("R_kept_eb", "f8", (3, 3)),  # attitude of the last healthy estimate, propagated
+        ("bias_kept_b_rad_s", "f8", (3,)),  # its gyro bias
+        ("wind_kept_e_m_s", "f8", (3,)),  # its wind, NaN if unknown
         ("omega_kept_b_rad_s", "f8", (3,)),
-        ("height_kept_m", "f8"),  # of the beginning of LEVEL
+        ("height_kept_m", "f8"),  # at the start of LEVEL
     ],
     align=True,
 )
-# One array with all that the kernel needs beside the tick's inputs: each array argument costs time per call.
-_MEMORY = np.dtype([("p", _PARAMS), ("asked", _ASKED), ("s", _STATE), ("on_nose", "i8")], align=True)
+# One array with everything the kernel needs besides the inputs of a tick: each array argument costs time per call.
+_MEMORY = np.dtype([("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8")], align=True)
 
 _WIND_UNKNOWN = np.full(3, np.nan)
-_DT_LIMIT_S = 0.1  # a longer sample interval is a gap; the integrals do not take it whole
+_DT_LIMIT_S = 0.1  # longer sample intervals are gaps and are not integrated in full
 
 
 @kernel
 def ask(mode, s):  # type: ignore[no-untyped-def]
-    """Take note of a mode newly asked for: a launch waits for a throw of its own."""
+    """Handle a new mode of the setpoint: each launch waits for a new throw."""
     if mode == LAUNCH:
         s.roll_integral = s.pitch_integral = s.felt_m_s2 = s.climb_integral_rad = s.throttle_integral = 0.0
         s.thrown_s = -1.0
         s.levelled_off = 0
-    s.asked_mode = mode
+    s.setpoint_mode = mode
 
 
 @kernel
 def enter(mode, led_by, height_m, s):  # type: ignore[no-untyped-def]
-    """Change to `mode`, led by `led_by`: forget what belongs to the one that is left, keep the trim that was learnt."""
+    """Change to `mode` with course by `led_by`: reset the state of the previous mode, but keep the learnt trim."""
     if mode != s.mode:
         if RATE in (mode, s.mode):
             s.roll_integral = s.pitch_integral = 0.0
@@ -138,24 +138,24 @@ def enter(mode, led_by, height_m, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def reckon_speed(wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
-    """On which side one flies, how fast one would, and how fast one does, into the state."""
+    """Update inverted flight, desired airspeed and known speeds in the state."""
     s, e = me.s, me.p.energy
-    s.inverted = me.asked.inverted and s.mode in (STABILISE, COURSE) and math.isfinite(e.inverted_m_s)
+    s.inverted = me.setpoint.inverted and s.mode in (STABILISE, COURSE) and math.isfinite(e.inverted_m_s)
     travels = s.led_by in (COURSE, RETURN, LOITER, WAYPOINTS)
     if travels:
-        towards_north, towards_east = way_wanted(me.asked, row, s, me.p.guidance)
+        towards_north, towards_east = way_wanted(me.setpoint, row, s, me.p.guidance)
         believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, me.p, dt_s)
-    want_airspeed(me.asked, travels, s, e)
+    want_airspeed(me.setpoint, travels, s, e)
     believe_airspeed(wind_e_m_s, row, s, me.p, dt_s)
 
 
 @kernel
 def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
-    """Bank and pitch demand, rad, and throttle of the modes that go somewhere, each by way of a height."""
-    asked, s, p, failsafe = me.asked, me.s, me.p.guidance, me.p.failsafe
+    """Bank and pitch demand, rad, and throttle of the navigation modes, which all hold a height."""
+    setpoint, s, p, failsafe = me.setpoint, me.s, me.p.guidance, me.p.failsafe
     north, east = direction_of_travel(R_eb, wind_e_m_s, row, s, me.on_nose, p)
-    limit_rad, wanted_m = min(asked.bank_limit_rad, p.bank_limit_rad), asked.height_m
-    if s.led_by != asked.mode or not asked.radio:  # home whatever the pilot last said of banks
+    limit_rad, wanted_m = min(setpoint.bank_limit_rad, p.bank_limit_rad), setpoint.height_m
+    if s.led_by != setpoint.mode or not setpoint.radio:  # return even if the last bank limit was tiny
         limit_rad = max(limit_rad, failsafe.bank_rad)
     if s.mode == LOW:
         limit_rad = min(limit_rad, failsafe.low_bank_rad)
@@ -167,14 +167,14 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
     elif s.led_by == LOITER:
         bank = bank_to_circle(
             north, east, r_zy, row, s, limit_rad,
-            asked.north_m, asked.east_m, asked.radius_m, asked.left, me.p.route, p,
+            setpoint.north_m, setpoint.east_m, setpoint.radius_m, setpoint.left, me.p.route, p,
         )  # fmt: skip
     elif s.led_by == WAYPOINTS:
         bank, wanted_m = bank_along_route(
-            north, east, r_zy, wind_e_m_s, row, height_m, asked, s, limit_rad, me.p.route, p
+            north, east, r_zy, wind_e_m_s, row, height_m, setpoint, s, limit_rad, me.p.route, p
         )
     else:
-        sine, cosine = heading_error(north, east, math.cos(asked.course_rad), math.sin(asked.course_rad))
+        sine, cosine = heading_error(north, east, math.cos(setpoint.course_rad), math.sin(setpoint.course_rad))
         bank = bank_for_heading(sine, cosine, r_zy, limit_rad, p)
     if s.mode == LOW:
         wanted_m = max(wanted_m, height_m + failsafe.climb_m)
@@ -184,13 +184,13 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
 
 @kernel
 def guide(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
-    """Bank and pitch demand, rad, and throttle of the modes that hold an attitude; `me` is the memory."""
-    asked, s = me.asked, me.s
+    """Bank and pitch demand, rad, and throttle of all modes with an attitude demand; `me` is the memory."""
+    setpoint, s = me.setpoint, me.s
     if s.mode == STABILISE:
-        return asked.bank_rad, asked.pitch_rad, throttle_for(asked.pitch_rad, s, me.p.energy)
+        return setpoint.bank_rad, setpoint.pitch_rad, throttle_for(setpoint.pitch_rad, s, me.p.energy)
     if s.mode == LAUNCH:
         thrown_s = feel_throw(R_eb, row, s, me.p.launch, dt_s)
-        pitch, throttle = climb_away(thrown_s, asked.height_m, row, s, me.p, dt_s)
+        pitch, throttle = climb_away(thrown_s, setpoint.height_m, row, s, me.p, dt_s)
         return 0.0, pitch, throttle
     if s.mode in (CIRCLE, GLIDE, LEVEL):
         return circle(s.mode, row, s, me.p, dt_s)
@@ -199,11 +199,11 @@ def guide(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped
 
 @kernel
 def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
-    """Aileron, elevator, rudder, throttle, bank demand and pitch demand of the mode in force, on an attitude."""
-    asked, s = me.asked, me.s
+    """Aileron, elevator, rudder, throttle, bank demand and pitch demand of the active mode, for an attitude."""
+    setpoint, s = me.setpoint, me.s
     bank = pitch = math.nan
     if s.mode == RATE:
-        rate = asked.rate_b_rad_s
+        rate = setpoint.rate_b_rad_s
         demand = (rate[0], rate[1], rate[2])
         throttle = me.p.energy.throttle_trim
     else:
@@ -214,29 +214,29 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
     in_hand = s.mode == LAUNCH and s.thrown_s < 0.0
     still_s = 0.0 if in_hand else dt_s
     moved = rate_control(demand, R_eb, omega_b_rad_s, s.airspeed_m_s, s, me.p.stabilise, still_s)
-    if math.isfinite(asked.throttle) and s.mode == asked.mode and asked.radio and not in_hand:
-        throttle = asked.throttle
+    if math.isfinite(setpoint.throttle) and s.mode == setpoint.mode and setpoint.radio and not in_hand:
+        throttle = setpoint.throttle
     aileron, elevator, rudder, throttle = mix(moved[0], moved[1], moved[2], throttle, me.p.mixer)
-    if s.inverted:  # told as the bank that it is: the demand counts from lying on its back
+    if s.inverted:  # recorded as true bank: the demand is relative to inverted flight
         bank -= math.copysign(math.pi, bank)
     return aileron, elevator, rudder, throttle, bank, pitch
 
 
 @kernel
-def by_hand(asked):  # type: ignore[no-untyped-def]
-    """What `steer` returns in MANUAL: the sticks are the surfaces, no trim, no mixing."""
-    throttle = asked.throttle if math.isfinite(asked.throttle) else 0.0
-    return asked.aileron, asked.elevator, asked.rudder, throttle, MANUAL, math.nan, math.nan
+def by_hand(setpoint):  # type: ignore[no-untyped-def]
+    """Result of `steer` in MANUAL: sticks directly to surfaces, without trim or mixing."""
+    throttle = setpoint.throttle if math.isfinite(setpoint.throttle) else 0.0
+    return setpoint.aileron, setpoint.elevator, setpoint.rudder, throttle, MANUAL, math.nan, math.nan
 
 
 @kernel
 def steer_on(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
-    """What `steer` returns in the mode in force, on an attitude, a rate and a wind."""
+    """Result of `steer` in the active mode, for an attitude, a rate and a wind."""
     s, p = me.s, me.p
     s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
     reckon_speed(wind_e_m_s, row, me, dt_s)
     if s.mode == MANUAL:
-        return by_hand(me.asked)
+        return by_hand(me.setpoint)
     moved = control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
     aileron, elevator, rudder, throttle, bank, pitch = moved
     return aileron, elevator, rudder, throttle, s.mode, bank, pitch
@@ -247,11 +247,11 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     """One tick: aileron, elevator, rudder, throttle, mode, bank demand and pitch demand.
 
     R_eb : shape (3, 3), estimated   omega_b_rad_s : shape (3,), corrected   gyro_bias_b_rad_s : shape (3,)
-    wind_e_m_s : shape (3,) or NaN   health : int, what the estimator says of itself
-    rows, k : measured log and its row   memory : shape (1,), parameters, set-point and state
+    wind_e_m_s : shape (3,) or NaN   health : int, reported by the estimator
+    rows, k : measured log and its row   memory : shape (1,), parameters, setpoint and state
     """
     me = memory[0]
-    asked, s, p, row = me.asked, me.s, me.p, rows[k]
+    setpoint, s, p, row = me.setpoint, me.s, me.p, rows[k]
     known = math.isfinite(row.dt_s)
     dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S) if known else 0.0
     for i in range(3):
@@ -259,32 +259,32 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
         for j in range(3):
             known = known and math.isfinite(R_eb[i, j])
     listen(row, s, p.failsafe, dt_s)
-    told = health if known else POOR
-    examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, told, row, s, p.failsafe, p.guidance, dt_s)
-    if asked.mode != s.asked_mode:
-        ask(asked.mode, s)
+    reported = health if known else POOR
+    examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, reported, row, s, p.failsafe, p.guidance, dt_s)
+    if setpoint.mode != s.setpoint_mode:
+        ask(setpoint.mode, s)
     height_m = height(row, p.guidance)
-    mode, led_by = mode_in_force(asked, height_m, s, p.failsafe, dt_s)
+    mode, led_by = mode_in_force(setpoint, height_m, s, p.failsafe, dt_s)
     if mode != s.mode or led_by != s.led_by:
         enter(mode, led_by, height_m, s)
-    if mode == LEVEL and not s.believed:  # nothing of the estimate is used
+    if mode == LEVEL and not s.believed:  # the estimate is not used
         return steer_on(s.R_kept_eb, s.omega_kept_b_rad_s, s.wind_kept_e_m_s, row, height_m, me, dt_s)
     if known:
         return steer_on(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
     if mode == MANUAL:
-        return by_hand(asked)
-    return 0.0, 0.0, 0.0, 0.0, mode, math.nan, math.nan  # whoever does not know the attitude holds still
+        return by_hand(setpoint)
+    return 0.0, 0.0, 0.0, 0.0, mode, math.nan, math.nan  # attitude unknown: neutral controls
 
 
-def _write(setpoint: Setpoint, asked: Any) -> None:
-    """Copy `setpoint` into the record `asked`; rows of the route that nobody asked for are NaN."""
+def _write(setpoint: Setpoint, record: Any) -> None:
+    """Copy `setpoint` into `record`; unused rows of the route are NaN."""
     for f in fields(Setpoint):
         if f.name != "route":
-            asked[f.name] = getattr(setpoint, f.name)
-    n = asked["n_waypoints"] = len(setpoint.route)
-    asked["route"] = np.nan
+            record[f.name] = getattr(setpoint, f.name)
+    n = record["n_waypoints"] = len(setpoint.route)
+    record["route"] = np.nan
     if n:
-        asked["route"][:n] = setpoint.route
+        record["route"][:n] = setpoint.route
 
 
 class Snapshot(NamedTuple):
@@ -295,67 +295,61 @@ class Snapshot(NamedTuple):
 
 
 class DcmAutopilot:
-    """Stabilises and leads the aeroplane on the direction cosine matrix (Premerlani & Bizard).
+    """Stabilisation and guidance on the direction cosine matrix (Premerlani & Bizard).
 
-    Needs no airspeed and no barometer: height and position come from the GPS.  The airspeed that a sensor measures,
-    or that follows from an estimator's wind, is used where there is one (`autopilot.energy`); else the speed is
-    guarded by pitch limits and by a throttle that follows the climb demand, or by the pitch of the glide.  In flight
-    it never raises; an attitude that is not finite gets neutral controls, motor off, until LEVEL takes over, but for
-    MANUAL, which needs none.
+    Requires no airspeed sensor or barometer: height and position come from the GPS.  Measured airspeed, or airspeed
+    from an estimated wind, is used if available (`autopilot.energy`); if not, speed is protected by pitch limits and a
+    throttle that follows the climb demand, or by the glide pitch.  It never raises in flight; while the attitude is
+    not finite, controls are neutral and the motor is off until LEVEL takes over, except in MANUAL.
 
     Parameters
     ----------
-    params              gains and limits; None is those of the aircraft
-    heading_reference   what the first column of the estimator's matrix points along: the "course" over the
-                        ground, or the "nose", which is steered by with the estimated wind; may be set later
-                        and holds from the next `reset` on
-    aircraft            name of what is flown, see `autopilot.airframes`; ValueError where nobody has tuned for it
+    params              gains and limits; None: those of the aircraft
+    heading_reference   direction of the first column of the estimator's matrix: "course" over the ground, or "nose",
+                        which needs the estimated wind to navigate; changes take effect at the next `reset`
+    aircraft            name of the aircraft, see `autopilot.airframes`; ValueError if it has no gains
     """
 
     def __init__(
-        self,
-        params: AutopilotParams | None = None,
-        heading_reference: HeadingReference = "course",
+        self, params: AutopilotParams | None = None, heading_reference: HeadingReference = "course",
         aircraft: str = "endurance",
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.params = params or params_of(aircraft)
         self.heading_reference = heading_reference
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything, as before the first flight.  ValueError for an unknown `heading_reference`."""
+        """Reset all state.  ValueError for an unknown `heading_reference`."""
         if self.heading_reference not in ("course", "nose"):
             raise ValueError(f"heading_reference {self.heading_reference!r}: must be 'course' or 'nose'")
         self._memory = np.zeros(1, _MEMORY)
         me = self._memory[0]
         for group in _GROUPS:
             me["p"][group] = astuple(getattr(self.params, group))
-        me["s"]["mode"] = me["s"]["asked_mode"] = me["s"]["led_by"] = me["s"]["thrown_s"] = -1
+        me["s"]["mode"] = me["s"]["setpoint_mode"] = me["s"]["led_by"] = me["s"]["thrown_s"] = -1
         me["s"]["believed"], me["s"]["heard_s"], me["s"]["R_kept_eb"] = 1, math.inf, np.eye(3)
         me["on_nose"] = self.heading_reference == "nose"
         self._setpoint: Setpoint | None = None
 
     def update(self, estimate: AttitudeEstimate, m: Measurements, setpoint: Setpoint) -> ActuatorCommand:
-        """Steer for one tick: `steer` above, on the estimate, the row of measurements and the set-point."""
+        """Command for one tick from the estimate, the row of measurements and the setpoint; see `steer`."""
         if setpoint is not self._setpoint:
             if self._setpoint is None or setpoint.route != self._setpoint.route:
                 self._memory["s"]["next_waypoint"] = self._memory["s"]["on_leg"] = 0
-            _write(setpoint, self._memory["asked"][0])
+            _write(setpoint, self._memory["setpoint"][0])
             self._setpoint = setpoint
         R_eb, omega, bias, wind, health = estimate
         if wind is None:
             wind = _WIND_UNKNOWN
-        if not (
-            R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray
-        ):  # somebody's lists
+        if not R_eb.__class__ is omega.__class__ is bias.__class__ is wind.__class__ is np.ndarray:  # lists
             R_eb, omega, bias, wind = (np.ascontiguousarray(x, np.float64) for x in (R_eb, omega, bias, wind))
         return ActuatorCommand._make(steer(R_eb, omega, bias, wind, int(health), m.rows, m.k, self._memory))
 
     def snapshot(self) -> Snapshot:
-        """All that changes in flight, for `restore`."""
+        """All changing state, for `restore`."""
         return Snapshot(self._memory.copy(), self._setpoint)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Continue exactly where `snapshot` was taken."""
+        """Continue exactly from `snapshot`."""
         self._memory = snapshot.memory.copy()
         self._setpoint = snapshot.setpoint

@@ -1,22 +1,21 @@
-"""Height and speed by energy: the throttle follows their sum, the pitch how it is shared.
+"""Total energy control of height and speed: throttle controls the sum, pitch the distribution.
 
-Per weight an aeroplane has the energy ``E = h + V^2 / 2 g``.  Thrust less drag changes the sum and nothing else
-does; the elevator trades the one part for the other.  So the demands, to climb at ``c`` and to gain speed at ``a``,
-which is worth a climb of ``V a / g``, go
+The energy per weight is ``E = h + V^2 / 2 g``.  Only thrust minus drag changes the sum; the elevator exchanges the two
+parts.  The demands, to climb at ``c`` and to accelerate at ``a``, equivalent to a climb of ``V a / g``, are split:
 
-    to the throttle    their sum              c + V a / g
-    to the pitch       what of it is height   (1 - w) c + w (e - V a / g)
+    throttle    their sum             c + V a / g
+    pitch       the height part       (1 - w) c + w (e - V a / g)
 
-with ``e`` the part of the sum that the throttle can give.  Where it can give all of it, that is ``c`` whatever the
-weight ``w``; where it cannot, ``w`` says who goes without.  Motor off, or none: ``w`` is 1, ``e`` is 0 against the
-glide, and the pitch holds the speed and no height.  Too near the stall no climb is asked of the pitch whatever the
-height is: the nose goes down.
+with ``e`` the part of the sum that the throttle can deliver.  If it can deliver all, the pitch gets ``c`` for any
+weight ``w``; if not, ``w`` determines whether height or speed suffers.  With the motor off, or none, ``w`` is 1 and
+``e`` is 0 relative to the glide: the pitch holds the speed and not the height.  Near the stall the climb demand of the
+pitch is limited whatever the height: the nose goes down.
 
-Where nobody knows the airspeed (no pitot tube, and an estimator that tells no wind) ``a`` is 0, and throttle and
-pitch follow the same climb demand: open loop, the speed stays near that for which they are trimmed.
+If the airspeed is unknown (no pitot tube and no estimated wind), ``a`` is 0 and throttle and pitch follow the same
+climb demand: the speed stays near the trim speed, open loop.
 
-The trim of any speed comes from the polar: the angle of attack goes with the lift coefficient, ``(V_c / V)^2`` in
-units of that at cruise, negative on the back; `tests/physics` holds it against the trimmed model.
+The trim at any speed comes from the polar: angle of attack goes with the lift coefficient, ``(V_c / V)^2`` relative to
+cruise, negative in inverted flight; `tests/physics` compares it with the trimmed model.
 
 Source: A. A. Lambregts, Vertical Flight Path and Speed Control Autopilot Design Using Total Energy Principles,
 AIAA 83-2239.
@@ -35,23 +34,37 @@ from estimator.interface import G_M_S2
 
 @dataclass(frozen=True, slots=True)
 class EnergyParams:
-    """Speeds, trim and gains; the defaults fly the aeroplane `endurance`.
+    """Speeds, trim and gains; the defaults are for the aeroplane `endurance`.
 
-    airspeed_m_s : cruise        stall_m_s, best_glide_m_s, fastest_m_s : other speeds of level flight
-    inverted_m_s, inverted_stall_m_s : on its back; NaN where it cannot fly there, and stays upright
-    speed_trust_s : a measured airspeed is believed for so long        speed_filter_s : time constant of the belief
-    headwind_found_s, headwind_lost_s : time constants of the headwind believed, growing and shrinking
-    climb_per_height_1_s, climb_limit_m_s, sink_limit_m_s : climb demanded per height missing, and its limits
-    gain_per_speed_1_s, gain_limit_m_s2 : acceleration demanded per airspeed missing, and its limit
-    height_weight : 1 - w: 0 where the pitch is the speed's
-    recovery_sink_m_s, climb_per_margin_1_s : sink demanded at `least_airspeed`, and climb allowed per speed above
-    pitch_trim_rad : pitch of level flight at cruise       pitch_limit_rad : the steepest demanded
-    pitch_per_lift_rad : more of it per lift coefficient, in units of that at cruise
-    pitch_per_climb_rad_m, pitch_integral_limit_rad : integral of the climb missing, and the most it holds
-    throttle_trim, throttle_per_speed_s_m, throttle_inverted : for level flight at cruise, faster, on its back
-    throttle_per_climb_s_m, throttle_per_height_1_m : per rate of energy, and its integral
-    throttle_integral_limit : the most it holds
-    throttle_least : keeps air over the tail
+    airspeed_m_s : cruise speed (m/s, default 12.6).  Higher: faster, more throttle
+    stall_m_s : stall speed (m/s, default 6.95).  Higher: the nose goes down earlier
+    best_glide_m_s : speed of best glide (m/s, default 8.6).  Higher: flies faster against headwind
+    fastest_m_s : maximum speed (m/s, default 18).  Lower: may not make headway against strong wind
+    inverted_m_s, inverted_stall_m_s : cruise and stall speed inverted; NaN: stays upright (m/s, default 14 and 11.3)
+    speed_trust_s : time for which a measured airspeed is used (s, default 0.5).  Higher: bridges longer dropouts
+    speed_filter_s : time constant of the airspeed (s, default 1).  Higher: smoother but later
+    headwind_found_s, headwind_lost_s : time constants of the headwind when rising and falling (s, default 1 and 30).
+        Higher: slower speed changes
+    climb_per_height_1_s : climb demand per height error (1/s, default 0.25).  Higher: faster, then oscillates
+    climb_limit_m_s, sink_limit_m_s : limits of the climb demand (m/s, default 3 and 2).  Higher: steeper
+    gain_per_speed_1_s, gain_limit_m_s2 : acceleration demand per speed error (1/s), and its limit (m/s2) (default 0.3
+        and 1.5).  Higher: holds speed more tightly, height less
+    height_weight : 1 - w, share of the pitch that holds height (default 0.5).  Higher: height first; 0: speed only
+    climb_per_margin_1_s : climb allowed per speed above `least_airspeed` (1/s, default 3).  Lower: more protection
+    recovery_sink_m_s : sink demand at `least_airspeed` (m/s, default 1).  Higher: faster recovery, more height lost
+    pitch_trim_rad : pitch in level flight at cruise (rad, default 1 deg).  Higher: climbs until learnt
+    pitch_limit_rad : largest pitch demand (rad, default 15 deg).  Higher: steeper, nearer the stall
+    pitch_per_lift_rad : pitch change per lift coefficient relative to cruise (rad, default 4.6 deg).  Higher: more
+        pitch up when slow
+    pitch_per_climb_rad_m : integral gain of the climb error (rad/m, default 0.01).  Higher: learns pitch errors faster
+    pitch_integral_limit_rad : limit of that integral (rad, default 10 deg).  Lower: large pitch errors remain
+    throttle_trim : throttle in level flight at cruise (default 0.6).  Higher: climbs or accelerates until learnt
+    throttle_per_speed_s_m : extra throttle per speed above cruise (s/m, default 0.045).  Higher: overshoots in speed
+    throttle_inverted : extra throttle inverted (default 0.08).  Higher: climbs inverted
+    throttle_per_climb_s_m : throttle per energy rate (s/m, default 0.085).  Higher: stronger response, then surges
+    throttle_per_height_1_m : integral gain of the energy error (1/m, default 0.01).  Higher: learns trim faster
+    throttle_integral_limit : limit of that integral (default 0.2).  Lower: large trim errors remain
+    throttle_least : minimum throttle (default 0.1), for airflow over the tail.  Higher: descends more slowly
     """
 
     airspeed_m_s: float = 12.6
@@ -86,24 +99,23 @@ class EnergyParams:
     throttle_least: float = 0.1
 
 
-SLOWEST, FASTEST = 0.6, 1.6  # of cruise: what is believed of an airspeed
+SLOWEST, FASTEST = 0.6, 1.6  # range of a plausible airspeed over cruise
 STALL_MARGIN = 1.2
 
 
 @kernel
 def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Airspeed now, m/s, and whether anybody knows it, in `s`; call once per tick.
+    """Update the airspeed, m/s, and whether it is known, in `s`; call once per tick.
 
-    Measured, where a pitot tube is fitted; else the GPS velocity less the wind, where the estimator tells one, as
-    much longer as the receiver's filter (time constant T) shortens a vector that turns at w, sqrt(1 + (w T)^2); else
-    the speed for which the aeroplane is trimmed.  The speed over the ground alone says nothing: in wind it is wrong
-    by all of it, and twice that from one leg to the next.
+    Measured, if a pitot tube is fitted; else from GPS velocity minus estimated wind, corrected for the receiver's
+    filter (time constant T), which shortens a vector turning at w by sqrt(1 + (w T)^2); else the trim speed.  Ground
+    speed alone is no measure of airspeed: it is wrong by the wind, and changes by twice that between opposite legs.
 
     wind_e_m_s : shape (3,) or NaN   row : measured   p : record of AutopilotParams
     s : record with `airspeed_m_s`, `airspeed_known`, `air_left_s`, updated
     """
     e = p.energy
-    measured = abs(row.airspeed_m_s) < AIRSPEED_RANGE_M_S  # NaN is not
+    measured = abs(row.airspeed_m_s) < AIRSPEED_RANGE_M_S  # False for NaN
     s.air_left_s = e.speed_trust_s if row.air_new and measured else s.air_left_s - dt_s
     if s.air_left_s > 0.0 and measured:
         now_m_s, s.airspeed_known = row.airspeed_m_s, 1
@@ -124,13 +136,13 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
 
 @kernel
 def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Speed over the ground now, and the wind against the way wanted, never below 0, m/s, in `s`.
+    """Update ground speed and headwind along the desired direction, at least 0, m/s, in `s`.
 
-    The headwind comes from the estimator's wind, where it tells one; else from what the ground speed has more or less
-    than the airspeed, the wind along the track: who is to turn round and is blown away is told by that before
-    he turns.  It is believed quickly and forgotten slowly, for across the wind nothing shows.
+    The headwind comes from the estimated wind; if unknown, from the difference of airspeed and ground speed along the
+    track, which shows it even before a turn into the wind.  It rises quickly and falls slowly, because it is not
+    visible across the wind.
 
-    towards_north, towards_east : way wanted, of length 1; (0, 0) is the way flown   wind_e_m_s : shape (3,) or NaN
+    towards_north, towards_east : unit vector, or (0, 0) for the present track   wind_e_m_s : shape (3,) or NaN
     row : measured   p : record of AutopilotParams   s : record with `ground_m_s` (NaN: unknown) and `headwind_m_s`
     """
     now_m_s, lag_s = 0.0, gps_age(row, p.guidance)
@@ -151,26 +163,26 @@ def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s): 
 
 @kernel
 def speed_to_fly(headwind_m_s, e):  # type: ignore[no-untyped-def]
-    """Airspeed, m/s, that brings one home against a headwind W for the least energy; never below cruise.
+    """Airspeed, m/s, of minimum energy per distance against a headwind W; at least cruise.
 
-    Energy per way over the ground is D V / (V - W).  With the drag a V^2 + b / V^2 and V_g^4 = b / a, the best
+    Energy per distance over the ground is D V / (V - W).  With the drag a V^2 + b / V^2 and V_g^4 = b / a, the best
     glide, its minimum is where 2 V^3 - 3 W V^2 = V_g^4 (2 / V - W / V^2): V_g in calm air, 3/2 W in a strong wind;
-    (V_g^3 + (3/2 W)^3)^(1/3) keeps within 5 % of it everywhere.  So does a glider's, that pays in height.
+    (V_g^3 + (3/2 W)^3)^(1/3) is within 5 % of it everywhere.  The same holds for a glider, in height.
     """
     cube = e.best_glide_m_s**3 + (1.5 * headwind_m_s) ** 3
     return clip(cube ** (1.0 / 3.0), e.airspeed_m_s, e.fastest_m_s)
 
 
 @kernel
-def want_airspeed(asked, travels, s, e):  # type: ignore[no-untyped-def]
-    """Airspeed wanted, m/s, in `s.airspeed_wanted_m_s`: cruise; on the way somewhere as asked, or as the wind needs.
+def want_airspeed(setpoint, travels, s, e):  # type: ignore[no-untyped-def]
+    """Set the desired airspeed, m/s, `s.airspeed_wanted_m_s`: cruise; in navigation the setpoint's, or by headwind.
 
-    asked : record of the set-point   travels : whether the mode in force goes somewhere
+    setpoint : its record   travels : whether the active mode navigates
     s : record with `inverted`, `headwind_m_s`   e : record of EnergyParams
     """
     wanted_m_s = e.inverted_m_s if s.inverted else e.airspeed_m_s
-    if travels and asked.radio and math.isfinite(asked.airspeed_m_s):
-        wanted_m_s = clip(asked.airspeed_m_s, least_airspeed(s, e), e.fastest_m_s)
+    if travels and setpoint.radio and math.isfinite(setpoint.airspeed_m_s):
+        wanted_m_s = clip(setpoint.airspeed_m_s, least_airspeed(s, e), e.fastest_m_s)
     elif travels:
         wanted_m_s = max(wanted_m_s, speed_to_fly(s.headwind_m_s, e))
     s.airspeed_wanted_m_s = wanted_m_s
@@ -178,7 +190,7 @@ def want_airspeed(asked, travels, s, e):  # type: ignore[no-untyped-def]
 
 @kernel
 def level_flight(s, e):  # type: ignore[no-untyped-def]
-    """Pitch, rad, and throttle of level flight (motor off: of the glide) at the airspeed wanted.
+    """Pitch, rad, and throttle of level flight (without motor: of the glide) at the desired airspeed.
 
     s : record with `airspeed_wanted_m_s` and `inverted`   e : record of EnergyParams
     """
@@ -198,7 +210,7 @@ def least_airspeed(s, e):  # type: ignore[no-untyped-def]
 
 @kernel
 def throttle_of(energy_m_s, trim, s, e):  # type: ignore[no-untyped-def]
-    """Throttle, 0..1, for a rate of energy, and the rate that it can give, m/s of climb; `trim` is for none."""
+    """Throttle, 0..1, for an energy rate, and the rate it can deliver, m/s of climb; `trim` is for zero."""
     level = trim + s.throttle_integral
     throttle = clip(level + e.throttle_per_climb_s_m * energy_m_s, e.throttle_least, 1.0)
     if e.throttle_per_climb_s_m <= 0.0:  # no motor
@@ -208,14 +220,14 @@ def throttle_of(energy_m_s, trim, s, e):  # type: ignore[no-untyped-def]
 
 @kernel
 def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Pitch demand, rad, and throttle, 0..1, that lead slowly to a height and to the airspeed wanted, and hold both.
+    """Pitch demand, rad, and throttle, 0..1, that reach and hold a height and the desired airspeed.
 
-    The integral of the climb missing takes up an estimate that is wrong in pitch, that of the energy missing a trim
-    that is wrong in throttle; the second waits where nobody knows the speed, which would pay for the first.  Without
-    a height: level flight.
+    The integrated climb error compensates pitch errors of the estimate, the integrated energy error a wrong throttle
+    trim; the second is frozen if the airspeed is unknown, as speed would change to compensate the first.  Without a
+    height: level flight.
 
     height_m : demanded   row : measured   p : record of AutopilotParams
-    s : record with `climb_integral_rad`, `throttle_integral`, updated, and what `believe_airspeed` wrote
+    s : record with `climb_integral_rad`, `throttle_integral`, updated, and the results of `believe_airspeed`
     """
     e = p.energy
     trim_rad, trim = level_flight(s, e)
@@ -223,7 +235,7 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     climb_m_s = sinking_m_s = 0.0
     if math.isfinite(missing_m):
         climb_m_s = clip(e.climb_per_height_1_s * missing_m, -e.sink_limit_m_s, e.climb_limit_m_s)
-        sinking_m_s = row.gps_v_e_m_s[2]  # the velocity is down
+        sinking_m_s = row.gps_v_e_m_s[2]  # velocity down
     gain_m_s, most_m_s = 0.0, math.inf
     if s.airspeed_known:
         gain_m_s2 = e.gain_per_speed_1_s * (s.airspeed_wanted_m_s - s.airspeed_m_s)
@@ -234,11 +246,11 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     climb_m_s = min(e.height_weight * climb_m_s + (1.0 - e.height_weight) * (given_m_s - gain_m_s), most_m_s)
     pitch_rad = trim_rad + climb_m_s / s.airspeed_wanted_m_s + s.climb_integral_rad
 
-    if e.height_weight > 0.0:  # else the climb is what the speed makes it
+    if e.height_weight > 0.0:  # otherwise the climb follows from the speed
         climb_missing_m_s = climb_m_s + sinking_m_s if math.isfinite(missing_m) else 0.0
     else:
         climb_missing_m_s = climb_m_s
-    if climb_m_s == most_m_s or most_m_s < 0.0:  # too slow: what is missing is not lift
+    if climb_m_s == most_m_s or most_m_s < 0.0:  # too slow: not a pitch error
         climb_missing_m_s = min(climb_missing_m_s, 0.0)
     learns = s.airspeed_known and math.isfinite(missing_m) and abs(given_m_s - energy_m_s) < 1e-6
     learn_trim(climb_missing_m_s, energy_m_s + sinking_m_s if learns else 0.0, s, e, dt_s)
@@ -247,7 +259,7 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def learn_trim(climb_missing_m_s, energy_missing_m_s, s, e, dt_s):  # type: ignore[no-untyped-def]
-    """One tick of the integrals of pitch and throttle; the caller hands 0 to the one that is to wait."""
+    """One tick of the integrals of pitch and throttle; an error of 0 freezes one."""
     integral_rad = s.climb_integral_rad + e.pitch_per_climb_rad_m * clip(climb_missing_m_s, -5.0, 5.0) * dt_s
     s.climb_integral_rad = clip(integral_rad, -e.pitch_integral_limit_rad, e.pitch_integral_limit_rad)
     integral = s.throttle_integral + e.throttle_per_height_1_m * energy_missing_m_s * dt_s
@@ -256,7 +268,7 @@ def learn_trim(climb_missing_m_s, energy_missing_m_s, s, e, dt_s):  # type: igno
 
 @kernel
 def throttle_for(pitch_rad, s, e):  # type: ignore[no-untyped-def]
-    """Throttle, 0..1, that goes with a held pitch at about the speed of level flight: where no height is held."""
+    """Throttle, 0..1, for a constant pitch at about the speed of level flight, for modes without height."""
     trim_rad, throttle = level_flight(s, e)
     climb_m_s = s.airspeed_wanted_m_s * math.sin(pitch_rad - trim_rad)
     return clip(throttle + e.throttle_per_climb_s_m * climb_m_s, e.throttle_least, 1.0)
@@ -264,9 +276,9 @@ def throttle_for(pitch_rad, s, e):  # type: ignore[no-untyped-def]
 
 @kernel
 def throttle_to_recover(r_zx, pitch_rad, throttle):  # type: ignore[no-untyped-def]
-    """The throttle of a pitch nobody asked for: shut as the nose drops far below the demand, full far above it.
+    """The throttle at a large pitch error: closed with the nose far below the demand, full far above it.
 
-    A motor that is to be off, in the hand or in a glide, stays off.   r_zx : minus the sine of the pitch
+    A motor that is off, in the hand or in a glide, stays off.   r_zx : minus the sine of the pitch
     pitch_rad : demanded
     """
     dropped = r_zx + math.sin(pitch_rad)

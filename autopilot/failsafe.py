@@ -1,34 +1,32 @@
-"""Which mode is in force: the mode asked for, or the failsafe that takes its place.
+"""The active mode: the commanded one or a failsafe.
 
-Each tick, the first line that applies:
+Each tick, the first row that applies:
 
 ==================  ==========================================  ================================================
-In force            When                                        What is flown
+Active mode         Condition                                   Flight
 ==================  ==========================================  ================================================
-MANUAL, RATE        asked for, and the radio is heard           what the pilot says: nothing below takes it away
-LEVEL               the estimator was healthy once, and calls   wings level at the height where it began, at least
-                    itself POOR, or tells no numbers, for       `safe_height_m`, on the attitude when it was last
-                    `unhealthy_s` though the GPS is alive and   healthy, carried on with the raw gyros less the
-                    shows a course; until it is GOOD as long    offset believed then (Eqn 17), in the wind believed
-                                                                then
-LAUNCH              asked for, and not over yet, radio or not   as asked
-STABILISE           asked for, and the radio is heard           as asked
-GLIDE               as CIRCLE, for more than `circle_s`         the same circle, motor off, at the pitch of a glide
-CIRCLE              no fix has arrived for `gps_lost_s`, after  a gentle circle at cruise and constant pitch: it
-                    some had; until they have arrived for       does not fly away, and drifts with the wind alone
-                    `gps_back_s`
-LOW                 below `low_height_m`, until above           where it was going, with little bank, climbing
+MANUAL, RATE        commanded, radio link up                    as commanded; no failsafe overrides it
+LEVEL               the estimator was GOOD once, and is POOR    wings level at the initial height, at least
+                    or not finite for `unhealthy_s` while the   `safe_height_m`, on the last healthy attitude
+                    GPS works and shows a course; until it has  propagated with the raw gyros minus the last bias
+                    been GOOD for as long                       (Eqn 17), with the last wind
+LAUNCH              commanded and not completed, with or        as commanded
+                    without radio link
+STABILISE           commanded, radio link up                    as commanded
+GLIDE               as CIRCLE, for more than `circle_s`         the same circle, motor off, at the glide pitch
+CIRCLE              no fix for `gps_lost_s`, after some had     a gentle circle at cruise and constant pitch, which
+                    arrived; until fixes for `gps_back_s`       stays in place except for wind drift
+LOW                 below `low_height_m`, until above           on course with little bank, climbing
                     `safe_height_m`
-RETURN              the radio is silent (``Setpoint.radio``)    back to the launch point
-COURSE, RETURN,     asked for                                   as asked
+RETURN              radio link lost (``Setpoint.radio``)        back to the launch point
+COURSE, RETURN,     commanded                                   as commanded
 LOITER, WAYPOINTS,
-LAUNCH that is over
+completed LAUNCH
 ==================  ==========================================  ================================================
 
-What counts for the GPS is that fixes ARRIVE: one that is 12 s late but alive is not lost.  An estimator that is POOR
-for want of fixes is the business of CIRCLE, and one that never was healthy has left no attitude to fall back on.
-A failsafe hands back what was asked for as it stands: the throw of a launch stays felt, a route goes on to the
-waypoint it was on the way to.
+The GPS counts as working while fixes arrive, even if they are 12 s late.  An estimator that is POOR for lack of fixes
+is handled by CIRCLE; one that was never healthy leaves no attitude to fall back on.  After a failsafe the commanded
+mode continues where it was: a detected throw stays detected, a route continues to its next waypoint.
 """
 
 import math
@@ -57,18 +55,23 @@ from estimator.rotation import integrate
 
 @dataclass(frozen=True, slots=True)
 class FailsafeParams:
-    """When a failsafe takes over, and how it flies; the defaults fly the aeroplane `endurance`.
+    """Conditions and behaviour of the failsafe modes; the defaults are for the aeroplane `endurance`.
 
-    gps_lost_s : silence after which the GPS counts as lost; longer than the pause between fixes of a slow receiver
-    gps_back_s : time for which fixes must have come again, with pauses of half that silence at most; longer than such
-        a pause, so that one fix alone is not taken for a GPS
-    circle_s : of the circle at cruise, before the motor is switched off
-    bank_rad : of the circle         glide_pitch_rad : of the glide, motor off
-    unhealthy_s : an estimator that is POOR for so long is not believed, one that is GOOD for so long is again
-    course_speed_m_s : over the ground; below, as against a strong wind, an estimator may want for a course, and is POOR
-        for that alone
-    low_height_m, safe_height_m : below the first too low, above the second no longer
-    low_bank_rad : the steepest bank while too low        climb_m : height asked for above that of now, while too low
+    gps_lost_s : time without fixes until the GPS counts as lost (s, default 3).  Higher: flies longer on old fixes;
+        lower than the fix interval: false alarms
+    gps_back_s : fixes must arrive for this time, with gaps up to half of `gps_lost_s`, until the GPS is used again (s,
+        default 2).  Higher: later recovery; below that gap: a single fix is enough
+    circle_s : time in CIRCLE before the motor is switched off (s, default 30).  Higher: waits longer, drifts further
+    bank_rad : bank of the circle (rad, default 10 deg).  Higher: tighter circle
+    glide_pitch_rad : pitch of the glide (rad, default -4 deg).  Higher: slower, nearer the stall
+    unhealthy_s : time POOR until the estimator is no longer trusted, and GOOD until it is again (s, default 5).
+        Higher: flies longer on a bad attitude; lower: reacts to short disturbances
+    course_speed_m_s : ground speed below which POOR is ignored, as a slow estimator may just lack a course (m/s,
+        default 5).  Higher: less protection at low speed
+    low_height_m, safe_height_m : LOW starts below the first and ends above the second (m, default 20 and 30).
+        Higher: intervenes more often
+    low_bank_rad : largest bank in LOW (rad, default 15 deg).  Higher: turns more, climbs less
+    climb_m : height demand above the present height in LOW (m, default 20).  Higher: steeper climb
     """
 
     gps_lost_s: float = 3.0
@@ -86,7 +89,7 @@ class FailsafeParams:
 
 @kernel
 def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Keep the books of the GPS: how long it has been silent, and for how long it has been heard again.
+    """Update the GPS status: time without fixes, and time since the last outage.
 
     row : measured   s : record with `silent_s`, `heard_s`, `circled_s`, updated   p : record of FailsafeParams
     """
@@ -101,17 +104,17 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def has_course(row, p):  # type: ignore[no-untyped-def]
-    """Whether the last fix moves fast enough over the ground to have a course."""
+    """Whether the ground speed of the last fix is sufficient for a course."""
     return math.hypot(row.gps_v_e_m_s[0], row.gps_v_e_m_s[1]) >= p.course_speed_m_s
 
 
 @kernel
 def examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, row, s, p, g, dt_s):  # type: ignore[no-untyped-def]
-    """Keep the books of the estimator: whether it is believed, and an attitude for when it is not.
+    """Update the estimator status: whether it is trusted, and an attitude in case it is not.
 
     R_eb : shape (3, 3), estimated   gyro_bias_b_rad_s : shape (3,)   wind_e_m_s : shape (3,) or NaN
-    health : what the estimator says of itself
-    s : record with `poor_s`, `believed`, `healthy_once` and the attitude, offset, wind and rate kept, updated
+    health : reported by the estimator
+    s : record with `poor_s`, `believed`, `healthy_once` and the kept attitude, bias, wind and rate, updated
     p, g : records of FailsafeParams, GuidanceParams
     """
     if health == GOOD:
@@ -135,7 +138,7 @@ def examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, row, s, p, g, dt_s):  #
 
 @kernel
 def carry_on(row, s, dt_s):  # type: ignore[no-untyped-def]
-    """Turn the attitude kept by one raw gyro sample less the offset kept (Eqns 16-21); no measurement turns nothing."""
+    """Propagate the kept attitude by one raw gyro sample minus the kept bias (Eqns 16-21); skips invalid ones."""
     gyro, most = row.gyro_b_rad_s, GYRO_RANGE_RAD_S
     if abs(gyro[0]) <= most and abs(gyro[1]) <= most and abs(gyro[2]) <= most:
         for i in range(3):
@@ -144,21 +147,21 @@ def carry_on(row, s, dt_s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def led_by(asked, s):  # type: ignore[no-untyped-def]
-    """The mode that would be flown if only the radio could fail."""
-    if not asked.radio and not (asked.mode == LAUNCH and not s.levelled_off):
+def led_by(setpoint, s):  # type: ignore[no-untyped-def]
+    """The mode if the radio link were the only possible failure."""
+    if not setpoint.radio and not (setpoint.mode == LAUNCH and not s.levelled_off):
         return RETURN
-    return COURSE if asked.mode == LOW else asked.mode
+    return COURSE if setpoint.mode == LOW else setpoint.mode
 
 
 @kernel
-def mode_in_force(asked, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """The mode flown in this tick, and the one that leads the way: the same, but for LOW.
+def mode_in_force(setpoint, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
+    """The active mode of this tick, and the one that determines the course: the same except in LOW.
 
-    asked : record of the set-point   height_m : of now, NaN where nobody knows
-    s : record of what `listen` and `examine` found, `low` and `circled_s` updated   p : record of FailsafeParams
+    setpoint : its record   height_m : present, NaN if unknown
+    s : record with the results of `listen` and `examine`; updates `low`, `circled_s`   p : record of FailsafeParams
     """
-    mode = led_by(asked, s)
+    mode = led_by(setpoint, s)
     if mode in (MANUAL, RATE):
         return mode, mode
     in_hand = mode == LAUNCH and s.thrown_s < 0.0
@@ -172,28 +175,28 @@ def mode_in_force(asked, height_m, s, p, dt_s):  # type: ignore[no-untyped-def]
         s.circled_s += dt_s
         mode = GLIDE if s.circled_s > p.circle_s else CIRCLE
         return mode, mode
-    if launched:  # wings level already, and on its way to its height
+    if launched:  # wings already level, climbing
         s.low = 0
         return mode, mode
     if height_m < p.low_height_m:
         s.low = 1
-    elif not height_m < p.safe_height_m:  # also where nobody knows
+    elif not height_m < p.safe_height_m:  # also if unknown
         s.low = 0
-    return (LOW if s.low or (asked.mode == LOW and asked.radio) else mode), mode
+    return (LOW if s.low or (setpoint.mode == LOW and setpoint.radio) else mode), mode
 
 
 @kernel
 def circle(mode, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE and LEVEL, which go nowhere.
+    """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE and LEVEL, which do not navigate.
 
     s : record of the height loop, and the height kept   p : record of AutopilotParams
     """
     bank_rad = 0.0 if mode == LEVEL else min(p.failsafe.bank_rad, p.guidance.bank_limit_rad)
     if mode == GLIDE:
         return bank_rad, p.failsafe.glide_pitch_rad, 0.0
-    # The climb that the GPS shows holds the pitch that gyros alone would lose; without a height, level flight.
+    # The GPS climb rate corrects the pitch drift of the gyros; level flight without a height.
     height_m = s.height_kept_m if mode == LEVEL else math.nan
-    if height_m < p.failsafe.safe_height_m:  # not where nobody knows
+    if height_m < p.failsafe.safe_height_m:  # not if unknown
         height_m = p.failsafe.safe_height_m
     pitch_rad, throttle = hold_height(height_m, row, s, p, dt_s)
     return bank_rad, pitch_rad, throttle

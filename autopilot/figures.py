@@ -1,11 +1,11 @@
-"""Aerobatic figures as timed set-points, for a script to fly.
+"""Aerobatic figures as timed setpoints for a script.
 
-A figure is flown by time alone: body rates, each held for the angle that it shall turn over the rate.  The aeroplane
-follows late, by as much when a rate begins as when it ends, so that the angle is kept.  What a figure leaves wrong
-(speed, crosswind, a gyro that ended) the set-point that is flown `after` it takes up.
+A figure is flown by time only: body rates, each for the duration angle / rate.  The aeroplane follows with the same
+delay at the start and at the end of a rate, so that the angle is right.  The setpoint flown `after` the figure corrects
+remaining errors (speed, crosswind, gyro saturation).
 
-Every figure begins with its run-in, wings level at a held pitch, which gathers speed or loses it.  Attitudes that a
-figure is said to end with are those of rates followed exactly from the pitch of the run-in.
+Every figure begins with a run-in, wings level at constant pitch, to gain or lose speed.  Final attitudes are stated for
+rates that are followed exactly from the pitch of the run-in.
 """
 
 import math
@@ -20,7 +20,7 @@ Axis = Literal["roll", "pitch", "yaw"]
 
 
 class RunIn(NamedTuple):
-    """Wings level before a figure: for how long, at which pitch (negative dives for speed), at which throttle."""
+    """Wings level before a figure: duration, pitch (negative: dive for speed) and throttle."""
 
     lasts_s: float = 3.0
     pitch_rad: float = 0.0
@@ -39,22 +39,18 @@ class _Step(NamedTuple):
 
 
 def inside_loops(
-    begin_s: float,
-    count: int,
-    after: Setpoint,
-    *,
-    pitch_rate_rad_s: float = math.radians(100.0),
-    run_in: RunIn = LEVEL,
-) -> Manoeuvre:
-    """Inside loops, pulled at a constant rate; the attitude is that of the run-in again.
+    begin_s: float, count: int, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), run_in: RunIn =
+    LEVEL,
+) -> Manoeuvre:  # fmt: skip
+    """Inside loops at constant pitch rate, ending at the attitude of the run-in.
 
     Parameters
     ----------
     begin_s             start of the run-in, since the release
-    count               loops
-    after               what to fly when the last loop ends: level flight, usually
-    pitch_rate_rad_s    slower is larger and asks more speed at the top, quicker asks more lift at the bottom
-    run_in              its throttle is that of the loops too
+    count               number of loops
+    after               setpoint after the last loop, usually level flight
+    pitch_rate_rad_s    lower: larger loops, more speed needed at the top; higher: more lift needed at the bottom
+    run_in              its throttle is used in the loops, too
 
     Returns
     -------
@@ -65,20 +61,16 @@ def inside_loops(
 
 
 def outside_loops(
-    begin_s: float,
-    count: int,
-    after: Setpoint,
-    *,
-    pitch_rate_rad_s: float = math.radians(68.0),
-    run_in: RunIn = LEVEL,
-) -> Manoeuvre:
-    """Outside loops, pushed from the top at a constant rate; the attitude is that of the run-in again.
+    begin_s: float, count: int, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(68.0), run_in: RunIn =
+    LEVEL,
+) -> Manoeuvre:  # fmt: skip
+    """Outside loops, pushed from the top at constant pitch rate, ending at the attitude of the run-in.
 
-    A cambered wing lifts little and drags much upside down: one loop spends the speed of its run-in.
+    Inverted, a cambered wing has little lift and much drag: one loop uses up the speed of the run-in.
 
     Parameters
     ----------
-    pitch_rate_rad_s    size of the rate, nose down
+    pitch_rate_rad_s    magnitude of the rate, nose down
     others              see `inside_loops`
 
     Returns
@@ -90,22 +82,17 @@ def outside_loops(
 
 
 def aileron_roll(
-    begin_s: float,
-    turns: float,
-    after: Setpoint,
-    *,
-    right: bool = True,
-    roll_rate_rad_s: float = math.radians(180.0),
-    run_in: RunIn = NOSE_UP,
-) -> Manoeuvre:
-    """Turns about the roll axis without a pause between them; the attitude is that of the run-in again.
+    begin_s: float, turns: float, after: Setpoint, *, right: bool = True, roll_rate_rad_s: float =
+    math.radians(180.0), run_in: RunIn = NOSE_UP,
+) -> Manoeuvre:  # fmt: skip
+    """Continuous aileron rolls, ending at the attitude of the run-in.
 
-    The nose falls while the lift points anywhere but up: the run-in raises it.
+    The nose drops during the roll, as the lift points sideways and down: the run-in raises it.
 
     Parameters
     ----------
-    turns               whole turns, or halves
-    roll_rate_rad_s     size of the rate
+    turns               number of rolls, also halves
+    roll_rate_rad_s     magnitude of the rate
     others              see `inside_loops`
 
     Returns
@@ -118,14 +105,10 @@ def aileron_roll(
 
 
 def immelmann(
-    begin_s: float,
-    after: Setpoint,
-    *,
-    pitch_rate_rad_s: float = math.radians(100.0),
-    roll_rate_rad_s: float = math.radians(180.0),
-    run_in: RunIn = LEVEL,
-) -> Manoeuvre:
-    """Half a loop up, then half a roll to the right at its top: level, higher, heading reversed.
+    begin_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), roll_rate_rad_s: float =
+    math.radians(180.0), run_in: RunIn = LEVEL,
+) -> Manoeuvre:  # fmt: skip
+    """Half loop up, then half roll to the right: ends level and higher, heading reversed.
 
     Returns
     -------
@@ -137,14 +120,10 @@ def immelmann(
 
 
 def split_s(
-    begin_s: float,
-    after: Setpoint,
-    *,
-    pitch_rate_rad_s: float = math.radians(100.0),
-    roll_rate_rad_s: float = math.radians(180.0),
-    run_in: RunIn = NOSE_UP,
-) -> Manoeuvre:
-    """Half a roll to the right, then half a loop down, motor off: level, lower, heading reversed.
+    begin_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), roll_rate_rad_s: float =
+    math.radians(180.0), run_in: RunIn = NOSE_UP,
+) -> Manoeuvre:  # fmt: skip
+    """Half roll to the right, then half loop down, motor off: ends level and lower, heading reversed.
 
     Returns
     -------
@@ -157,20 +136,15 @@ def split_s(
 
 
 def vertical_climb(
-    begin_s: float,
-    climb_s: float,
-    after: Setpoint,
-    *,
-    pitch_rate_rad_s: float = math.radians(100.0),
-    pull_to_rad: float = QUARTER,
-    run_in: RunIn = LEVEL,
-) -> Manoeuvre:
-    """Pulled to the vertical, then no rates at all for `climb_s`, then pushed over until the nose is level.
+    begin_s: float, climb_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), pull_to_rad:
+    float = QUARTER, run_in: RunIn = LEVEL,
+) -> Manoeuvre:  # fmt: skip
+    """Pull to the vertical, zero rates for `climb_s`, then push over to a level nose.
 
     Parameters
     ----------
-    climb_s             vertical; pushed over while there is speed left
-    pull_to_rad         pitch to pull to: a little beyond the vertical, where the nose falls back as the speed goes
+    climb_s             duration of the vertical part, ending with some speed left
+    pull_to_rad         pitch at the end of the pull: slightly beyond the vertical if the nose falls back when slow
     others              see `inside_loops`
 
     Returns
@@ -183,25 +157,18 @@ def vertical_climb(
 
 
 def stall_turn(
-    begin_s: float,
-    climb_s: float,
-    after: Setpoint,
-    *,
-    right: bool = False,
-    pitch_rate_rad_s: float = math.radians(100.0),
-    pull_to_rad: float = QUARTER,
-    over_s: float = 1.6,
-    dive_s: float = 0.5,
-    run_in: RunIn = LEVEL,
-) -> Manoeuvre:
-    """Vertical climb, full rudder until the nose points down, dive, pull out: level, heading reversed.
+    begin_s: float, climb_s: float, after: Setpoint, *, right: bool = False, pitch_rate_rad_s: float =
+    math.radians(100.0), pull_to_rad: float = QUARTER, over_s: float = 1.6, dive_s: float = 0.5, run_in: RunIn =
+    LEVEL,
+) -> Manoeuvre:  # fmt: skip
+    """Vertical climb, full rudder until the nose points down, dive, pull-out: ends level, heading reversed.
 
     Parameters
     ----------
-    climb_s             vertical, without rates, until the rudder can turn the nose over: it lives on the slipstream
-    right               which way; the torque of a motor that turns to the right helps to the left
-    over_s              full rudder, full throttle; how fast that turns it is the aeroplane's business
-    dive_s              straight down before the pull, motor off
+    climb_s             duration of the vertical part, until the rudder in the slipstream can turn the nose over
+    right               direction; the torque of a clockwise motor helps to the left
+    over_s              duration of full rudder and throttle; the yaw rate depends on the aeroplane
+    dive_s              duration of the vertical dive before the pull, motor off
     others              see `inside_loops` and `vertical_climb`
 
     Returns
@@ -213,32 +180,26 @@ def stall_turn(
     climb = _straight_up("stall_turn", climb_s, pitch_rate_rad_s, pull_to_rad, run_in)
     over = Setpoint(Mode.MANUAL, rudder=1.0 if right else -1.0, throttle=run_in.throttle)
     dive = Setpoint(Mode.RATE, throttle=0.0)
-    # Yawed round by half a turn, a nose that was beyond the vertical is beyond it by as much coming down.
+    # After yawing by 180 degrees, a nose beyond the vertical is beyond it by the same angle pointing down.
     pull = _rotation("pitch", pull_to_rad, pitch_rate_rad_s, throttle=0.0)
     return _in_turn(begin_s, after, *climb, _Step(over_s, over), _Step(dive_s, dive), pull)
 
 
 def spin(
-    begin_s: float,
-    hold_s: float,
-    after: Setpoint,
-    *,
-    right: bool = False,
-    throttle: float = 0.6,
-    recovery_s: float = 0.4,
-    run_in: RunIn = STALLING,
-) -> Manoeuvre:
-    """Stalled, spun with the sticks in the corner, and brought out of it by the book.
+    begin_s: float, hold_s: float, after: Setpoint, *, right: bool = False, throttle: float = 0.6, recovery_s: float
+    = 0.4, run_in: RunIn = STALLING,
+) -> Manoeuvre:  # fmt: skip
+    """Stall, spin with full rudder and up-elevator, and standard recovery.
 
     Manual control: full rudder and full up-elevator for `hold_s`; then power off, ailerons neutral, full opposite
     rudder, elevator forward.
 
     Parameters
     ----------
-    hold_s              sticks in the corner; how many turns that makes is the aeroplane's business
-    right               which way the rudder is put; the torque of a motor that turns to the right helps to the left
-    throttle            in the spin: some of it, where the elevator cannot hold the stall without slipstream
-    recovery_s          until the rotation has stopped: held longer, the opposite rudder begins something new
+    hold_s              duration of the spin controls; the number of turns depends on the aeroplane
+    right               direction of the rudder; the torque of a clockwise motor helps to the left
+    throttle            in the spin: above 0 if the elevator cannot hold the stall without slipstream
+    recovery_s          until the rotation stops; longer opposite rudder may start a new spin
     run_in              motor off and nose up until the wing stalls
     others              see `inside_loops`
 
@@ -254,21 +215,15 @@ def spin(
 
 
 def inverted_circuit(
-    begin_s: float,
-    course: Setpoint,
-    legs: int,
-    leg_s: float,
-    after: Setpoint,
-    *,
-    turn_rad: float = QUARTER,
-) -> Manoeuvre:
-    """Upside down along `legs` courses, each `turn_rad` further round: four right angles are a square.
+    begin_s: float, course: Setpoint, legs: int, leg_s: float, after: Setpoint, *, turn_rad: float = QUARTER,
+) -> Manoeuvre:  # fmt: skip
+    """Inverted flight along `legs` courses, each turned by `turn_rad`: four right angles form a square.
 
     Parameters
     ----------
-    course      COURSE set-point of the first leg, flown inverted; the roll is the autopilot's
-    leg_s       time from one change of course to the next
-    after       what to fly then: upright again, usually
+    course      COURSE setpoint of the first leg, flown inverted; the autopilot does the roll
+    leg_s       time between course changes
+    after       setpoint afterwards, usually upright flight
     turn_rad    change of course, positive to the right
 
     Returns
@@ -277,7 +232,7 @@ def inverted_circuit(
     """
     _require_positive("inverted_circuit", legs=legs, leg_s=leg_s)
     if course.mode != Mode.COURSE:
-        raise ValueError(f"inverted_circuit: course of mode {course.mode.name} must be one of mode COURSE")
+        raise ValueError(f"inverted_circuit: course of mode {course.mode.name}: must be of mode COURSE")
     steps = (
         _Step(leg_s, replace(course, inverted=True, course_rad=course.course_rad + i * turn_rad)) for i in range(legs)
     )
@@ -287,28 +242,28 @@ def inverted_circuit(
 def _straight_up(
     figure: str, climb_s: float, pitch_rate_rad_s: float, pull_to_rad: float, run_in: RunIn
 ) -> list[_Step]:
-    """The run-in, the pull, and the climb without rates."""
+    """The run-in, the pull, and the climb at zero rates."""
     _require_positive(figure, climb_s=climb_s, pitch_rate_rad_s=pitch_rate_rad_s, pull_to_rad=pull_to_rad)
     pull = _rotated(run_in, ("pitch", pull_to_rad - run_in.pitch_rad, pitch_rate_rad_s))
     return [*pull, _Step(climb_s, Setpoint(Mode.RATE, throttle=run_in.throttle))]
 
 
 def _rotated(run_in: RunIn, *rotations: tuple[Axis, float, float]) -> list[_Step]:
-    """The run-in, and rotations (axis, angle, rate) one after the other at its throttle."""
+    """The run-in, then rotations (axis, angle, rate) at its throttle."""
     _require_positive("run_in", lasts_s=run_in.lasts_s)
     level = Setpoint(Mode.STABILISE, pitch_rad=run_in.pitch_rad, throttle=run_in.throttle)
     return [_Step(run_in.lasts_s, level), *(_rotation(*rotation, run_in.throttle) for rotation in rotations)]
 
 
 def _rotation(axis: Axis, angle_rad: float, rate_rad_s: float, throttle: float) -> _Step:
-    """Turn about a body axis by `angle_rad`, whose sign is the way round, at the size of `rate_rad_s`."""
+    """Rotation about a body axis by the signed `angle_rad`, at the magnitude `rate_rad_s`."""
     rate = math.copysign(rate_rad_s, angle_rad)
     p, q, r = (rate if axis == about else 0.0 for about in ("roll", "pitch", "yaw"))
     return _Step(abs(angle_rad) / rate_rad_s, Setpoint(Mode.RATE, rate_b_rad_s=(p, q, r), throttle=throttle))
 
 
 def _in_turn(begin_s: float, after: Setpoint, *steps: _Step) -> Manoeuvre:
-    """The steps one after the other from `begin_s` on, then `after`."""
+    """The steps in order from `begin_s`, then `after`."""
     timed, t_s = [], begin_s
     for step in steps:
         timed.append(Timed(t_s, step.setpoint))
@@ -317,7 +272,7 @@ def _in_turn(begin_s: float, after: Setpoint, *steps: _Step) -> Manoeuvre:
 
 
 def _require_positive(figure: str, **values: float) -> None:
-    """ValueError naming the figure and the argument that is not a positive, finite number; units are in the names."""
+    """ValueError with the figure and the argument that is not positive and finite; names contain the units."""
     for name, value in values.items():
         if not 0.0 < value < math.inf:
             raise ValueError(f"{figure}: {name} = {value!r} must be positive and finite")

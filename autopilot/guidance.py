@@ -1,8 +1,8 @@
-"""Where to fly: bank from the heading error, and the return to launch.
+"""Guidance: bank from the heading error, and the return to launch.
 
-The heading error comes as the sine (cross product) and the cosine (dot product) of the direction of travel
-and the direction wanted, horizontal components only; it works at any attitude, upside down included.  A
-negative cosine means more than 90 degrees off course: the bank saturates.
+The heading error is given by the sine (cross product) and the cosine (dot product) of the horizontal directions of
+travel and demand; it works at any attitude, including inverted.  A negative cosine means an error above 90 degrees,
+where the bank saturates.
 
 Source: Premerlani & Bizard, Direction Cosine Matrix IMU: Theory, "Using DCM in control and navigation", 3, 5.
 """
@@ -15,23 +15,26 @@ from autopilot.stabilise import shorter_way
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
 
-MOST_M, MOST_M_S = 1e6, 1000.0  # no fix is further from the launch point, or faster
-MOST_WIND_M_S = 100.0  # and no wind is
+MOST_M, MOST_M_S = 1e6, 1000.0  # limits of a valid fix
+MOST_WIND_M_S = 100.0  # limit of a valid wind
 
 
 @dataclass(frozen=True, slots=True)
 class GuidanceParams:
-    """How the aeroplane is led; the defaults fly the aeroplane `endurance` on a GPS that is 1.3 s late.
+    """Guidance gains and limits; the defaults are for the aeroplane `endurance` with a GPS that lags by 1.3 s.
 
-    bank_per_heading : bank demanded per unit of sine of the heading error; larger is quicker, then weaves
-    bank_limit_rad : the steepest bank ever demanded to turn, whatever the set-point allows
-    slow_ground : of the cruise speed, the speed over the ground below which turns are gentler, see `agility`
-    least_agility : the part of its bank that a turn keeps however slow that is
-    wind_share : of the airspeed, the most wind that is steered with
-    gps_filter_s : age of a fix beyond its time stamp, from the filter inside the receiver
-    gps_patience_s : age of a fix after which it is no longer believed
-    circling_bank_rad : flown where there is no position to return from
-    passed_m, turn_back_m : nearer than the first is past the launch point; beyond the second it turns back
+    bank_per_heading : bank per sine of the heading error (rad, default 1.2).  Higher: faster turns, then weaves
+    bank_limit_rad : largest bank in turns, whatever the setpoint allows (rad, default 85 deg).  Lower: wider turns
+    slow_ground : ground speed over cruise speed below which turns are gentler, see `agility` (default 0.9).  Higher:
+        gentle turns also in light headwind; lower: the heading may be lost when drifting backwards
+    least_agility : fraction of the bank kept at the lowest ground speed (default 0.3).  Higher: faster turns
+    wind_share : largest wind used for navigation, over the airspeed (default 0.8).  Higher: more crab in strong wind
+    gps_filter_s : age of a fix beyond its time stamp, due to the receiver's filter (s, default 1).  Wrong: the track is
+        offset in turns
+    gps_patience_s : age after which a fix is no longer used (s, default 5).  Higher: flies longer on old fixes
+    circling_bank_rad : bank without a position (rad, default 15 deg).  Higher: tighter circle
+    passed_m : distance at which the launch point counts as passed (m, default 15).  Lower: may be missed
+    turn_back_m : distance at which it turns back (m, default 60).  Higher: longer passes
     """
 
     bank_per_heading: float = 1.2
@@ -48,7 +51,7 @@ class GuidanceParams:
 
 @kernel
 def is_fix(row):  # type: ignore[no-untyped-def]
-    """Whether position and velocity of `row` can be those of an aeroplane; NaN and infinity cannot."""
+    """Whether position and velocity of `row` are plausible; NaN and infinity are not."""
     good = True
     for i in range(3):
         good = good and abs(row.gps_p_e_m[i]) <= MOST_M and abs(row.gps_v_e_m_s[i]) <= MOST_M_S
@@ -57,7 +60,7 @@ def is_fix(row):  # type: ignore[no-untyped-def]
 
 @kernel
 def is_wind(wind_e_m_s, components):  # type: ignore[no-untyped-def]
-    """Whether so many components of a wind can be those of one; NaN, where the estimator tells none, cannot."""
+    """Whether the first `components` of a wind are plausible; NaN (unknown) is not."""
     good = True
     for i in range(components):
         good = good and abs(wind_e_m_s[i]) <= MOST_WIND_M_S
@@ -66,23 +69,23 @@ def is_wind(wind_e_m_s, components):  # type: ignore[no-untyped-def]
 
 @kernel
 def gps_age(row, p):  # type: ignore[no-untyped-def]
-    """Age of the motion that the last fix describes, s; infinite where there is none to believe."""
+    """Age of the motion in the last fix, s; infinite if there is no usable fix."""
     if row.gps_valid == 0:
         return math.inf
-    age_s = row.t_s - row.gps_t_s  # NaN is no age
+    age_s = row.t_s - row.gps_t_s  # NaN: no time stamp
     return max(age_s, 0.0) + p.gps_filter_s if is_fix(row) and age_s < p.gps_patience_s else math.inf
 
 
 @kernel
 def unit(north, east):  # type: ignore[no-untyped-def]
-    """Horizontal direction (north, east) of length 1; (0, 0) where there is none."""
+    """Horizontal unit vector (north, east); (0, 0) for zero length."""
     length = math.hypot(north, east)
     return (north / length, east / length) if length > 1e-9 else (0.0, 0.0)
 
 
 @kernel
 def unseen_turn(unseen_rad, R_eb, omega_b_rad_s, lag_s, dt_s):  # type: ignore[no-untyped-def]
-    """Angle turned that a GPS course, late by `lag_s`, does not show yet, after one tick, rad.
+    """Turn angle not yet visible in a GPS course that lags by `lag_s`, after one tick, rad.
 
     The rate about the vertical is the third row of the matrix times the gyro vector (the paper's point 5).
     """
@@ -94,10 +97,10 @@ def unseen_turn(unseen_rad, R_eb, omega_b_rad_s, lag_s, dt_s):  # type: ignore[n
 def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, p):  # type: ignore[no-untyped-def]
     """Horizontal direction (north, east) in which the aeroplane moves over the ground.
 
-    A matrix whose heading is locked to the course has it in its first column.  One whose heading is the nose
-    needs the wind: nose x airspeed + wind; or, where nobody knows the wind, the GPS velocity, turned by
-    what it has not seen yet.  Of a wind near the airspeed or above it no more is counted than leaves the nose in
-    front: blown backwards one still points it homewards, and does not turn round to fly where one drifts.
+    With a heading locked to the course it is the first column of the matrix.  With a nose heading it is nose x
+    airspeed + wind or, if the wind is unknown, the GPS velocity rotated by the unseen turn.  A wind near or above the
+    airspeed is limited so that the direction stays ahead of the nose: even when blown backwards, the aeroplane keeps
+    pointing home instead of turning to where it drifts.
 
     R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured
     s : record with `airspeed_m_s`, `unseen_turn_rad`
@@ -132,15 +135,15 @@ def agility(s, cruise_m_s, p):  # type: ignore[no-untyped-def]
 
 @kernel
 def heading_error(north, east, wanted_north, wanted_east):  # type: ignore[no-untyped-def]
-    """Sine and cosine of the angle from the direction flown to the one wanted (the paper's point 3)."""
+    """Sine and cosine of the angle from the direction flown to that demanded (the paper's point 3)."""
     return north * wanted_east - east * wanted_north, north * wanted_north + east * wanted_east
 
 
 @kernel
 def bank_for_heading(sine, cosine, r_zy, limit_rad, p):  # type: ignore[no-untyped-def]
-    """Bank demand, rad, positive right: gain times the sine, or the limit where the cosine is negative.
+    """Bank demand, rad, positive right: gain times the sine, or the limit if the cosine is negative.
 
-    Nearly dead astern one turns to the side to which the wings already lean.
+    Near 180 degrees it turns in the direction of the present bank.
     """
     if cosine < 0.0:
         return limit_rad * shorter_way(sine, cosine, 0.5 * r_zy)
@@ -149,7 +152,7 @@ def bank_for_heading(sine, cosine, r_zy, limit_rad, p):  # type: ignore[no-untyp
 
 @kernel
 def way_home(row, p):  # type: ignore[no-untyped-def]
-    """(north, east) from here to the launch point, m: the last fix moved on by its age; NaN where there is none."""
+    """(north, east) to the launch point, m, from the last fix extrapolated by its age; NaN without a fix."""
     age_s = gps_age(row, p)
     if not math.isfinite(age_s):
         return math.nan, math.nan
@@ -157,13 +160,13 @@ def way_home(row, p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def way_wanted(asked, row, s, p):  # type: ignore[no-untyped-def]
-    """Direction (north, east) of the course or of the launch point, whichever leads; (0, 0) where neither does.
+def way_wanted(setpoint, row, s, p):  # type: ignore[no-untyped-def]
+    """Direction (north, east) of the course or of the launch point, by mode; (0, 0) for other modes.
 
-    asked : record of the set-point   s : record with `led_by`, `outbound`
+    setpoint : its record   s : record with `led_by`, `outbound`
     """
     if s.led_by == COURSE:
-        return math.cos(asked.course_rad), math.sin(asked.course_rad)
+        return math.cos(setpoint.course_rad), math.sin(setpoint.course_rad)
     if s.led_by == RETURN and not s.outbound:
         north, east = way_home(row, p)
         if math.isfinite(north):
@@ -175,8 +178,8 @@ def way_wanted(asked, row, s, p):  # type: ignore[no-untyped-def]
 def bank_to_return(north, east, r_zy, row, s, limit_rad, p):  # type: ignore[no-untyped-def]
     """Bank demand, rad, that leads to the launch point, over it, away from it, and back again.
 
-    Having passed it one flies straight on for a while: who turns at once circles round it for ever, with the
-    launch point always abeam.  Without a position one circles gently where one is.
+    After passing it, it flies straight on for a while; turning at once would circle for ever with the launch point
+    abeam.  Without a position it circles gently.
 
     north, east : direction of travel   row : measured   s : record with `outbound`, updated
     """
@@ -197,6 +200,6 @@ def bank_to_return(north, east, r_zy, row, s, limit_rad, p):  # type: ignore[no-
 
 @kernel
 def height(row, p):  # type: ignore[no-untyped-def]
-    """Height above the launch point now, m: the last fix moved on by its age; NaN where there is none."""
+    """Height above the launch point, m, from the last fix extrapolated by its age; NaN without a fix."""
     age_s = gps_age(row, p)
     return -(row.gps_p_e_m[2] + age_s * row.gps_v_e_m_s[2]) if math.isfinite(age_s) else math.nan

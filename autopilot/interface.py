@@ -1,4 +1,4 @@
-"""What is asked of an autopilot and what it answers: set-points in, actuator commands out."""
+"""The interface of an autopilot: setpoints in, actuator commands out."""
 
 import math
 from dataclasses import dataclass
@@ -9,20 +9,20 @@ from estimator.interface import AttitudeEstimate, Measurements
 
 
 class Mode(IntEnum):
-    """How the set-point is read.  The last four are asked for by nobody: failsafes, see `autopilot.failsafe`."""
+    """Flight modes.  The last four are failsafe modes, which cannot be commanded: see `autopilot.failsafe`."""
 
     MANUAL = 0  # sticks move the surfaces
     RATE = 1  # sticks command body rates
     STABILISE = 2  # bank and pitch are held
     COURSE = 3  # course and height are held
-    RETURN = 4  # back to the launch point, then passes over it again and again
-    LAUNCH = 5  # motor off until the throw is felt, then a straight climb to the height
-    LOITER = 6  # round a point at a height
-    WAYPOINTS = 7  # along a route, leg by leg
-    CIRCLE = 8  # no position: a gentle circle where one is, at cruise
-    GLIDE = 9  # no position for long: the same circle, motor off, until somebody helps or the ground comes
-    LEVEL = 10  # no attitude to believe: wings level on the gyros alone
-    LOW = 11  # too near the ground: climbs, and hardly banks on its way
+    RETURN = 4  # to the launch point, then repeated passes over it
+    LAUNCH = 5  # motor off until the throw is detected, then a straight climb to the height
+    LOITER = 6  # around a point at a height
+    WAYPOINTS = 7  # along the legs of a route
+    CIRCLE = 8  # no position: a gentle circle at the present place, at cruise
+    GLIDE = 9  # no position for a long time: the same circle, motor off
+    LEVEL = 10  # no trusted attitude: wings level on the gyros alone
+    LOW = 11  # too close to the ground: climbs on course with little bank
 
 
 # As plain integers, for kernels: numba is slow with enumerations.
@@ -30,7 +30,7 @@ MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLID
 
 
 class Waypoint(NamedTuple):
-    """A point of a route, from the launch point."""
+    """A point of a route, relative to the launch point."""
 
     north_m: float
     east_m: float
@@ -40,7 +40,7 @@ class Waypoint(NamedTuple):
 MOST_WAYPOINTS = 32
 
 
-_UPRIGHT_RAD = math.radians(85.0)  # the attitude modes hold no steeper bank or pitch: beyond, fly RATE
+_UPRIGHT_RAD = math.radians(85.0)  # limit of the attitude modes; use RATE beyond it
 _RANGES = (
     ("aileron", -1.0, 1.0, "of full deflection"),
     ("elevator", -1.0, 1.0, "of full deflection"),
@@ -61,22 +61,22 @@ _MAY_BE_NAN = ("throttle", "airspeed_m_s")
 
 @dataclass(frozen=True, slots=True)
 class Setpoint:
-    """What the aeroplane shall do from now on.  Which fields count depends on the mode.
+    """Commands of the pilot.  The mode determines which fields are used.
 
-    aileron, elevator, rudder : -1..1    MANUAL: the surfaces, sign of the rotation they cause
-    rate_b_rad_s : (p, q, r)             RATE: body rates to follow
+    aileron, elevator, rudder : -1..1    MANUAL: surface deflections, by sign of the resulting rotation
+    rate_b_rad_s : (p, q, r)             RATE: body rates
     bank_rad, pitch_rad : float          STABILISE
-    course_rad : float                   COURSE: over ground (or nose, where the estimator knows only that)
+    course_rad : float                   COURSE: over ground (or nose, if the estimator knows only that)
     height_m : float                     COURSE, RETURN, LAUNCH, LOITER: above the launch point
-    bank_limit_rad : float               COURSE, RETURN, LOITER, WAYPOINTS: the steepest bank used to turn
-    throttle : 0..1 or NaN               NaN leaves the throttle to the autopilot (MANUAL: NaN is off)
-    inverted : bool                      STABILISE, COURSE: on its back; bank and pitch count from there, a positive
-                                         bank turns right over the ground as ever
+    bank_limit_rad : float               COURSE, RETURN, LOITER, WAYPOINTS: largest bank in turns
+    throttle : 0..1 or NaN               NaN: chosen by the autopilot (MANUAL: off)
+    inverted : bool                      STABILISE, COURSE: inverted flight; bank and pitch are relative to it, and a
+                                         positive bank still turns right over the ground
     north_m, east_m, radius_m : float    LOITER: centre, from the launch point, and radius
     left : bool                          LOITER: turning left
-    route : of `Waypoint`                WAYPOINTS: flown in order, then again from the first; 1 to 32
-    airspeed_m_s : float or NaN          COURSE, RETURN, LOITER, WAYPOINTS: NaN is cruise, more against a strong wind
-    radio : bool                         False: the pilot is not heard any more, the rest is what he asked for last
+    route : of `Waypoint`                WAYPOINTS: flown in order and repeated; 1 to 32
+    airspeed_m_s : float or NaN          COURSE, RETURN, LOITER, WAYPOINTS; NaN: cruise, faster against strong wind
+    radio : bool                         False: radio link lost; the other fields are the last ones received
     """
 
     mode: Mode
@@ -100,7 +100,7 @@ class Setpoint:
     radio: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse what no aeroplane can be asked, here and not in the air."""
+        """Reject impossible commands before the flight: ValueError."""
         for name, low, high, unit in _RANGES:
             value = getattr(self, name)
             if not low <= value <= high and not (name in _MAY_BE_NAN and math.isnan(value)):
@@ -117,18 +117,18 @@ class Setpoint:
 
 
 class ActuatorCommand(NamedTuple):
-    """What the servos and the motor are told; with it, for the record, what the inner loop was asked to hold.
+    """Commands to servos and motor, and for the recording the demands of the inner loop.
 
-    aileron, elevator, rudder : -1..1, sense of the rotation they cause: roll right, nose up, nose right
-    throttle : 0..1    mode : the mode in force    bank_demand_rad, pitch_demand_rad : NaN where none is held
-    (upside down a bank beyond 90 degrees)
+    aileron, elevator, rudder : -1..1, by the resulting rotation: roll right, nose up, nose right
+    throttle : 0..1    mode : the active mode    bank_demand_rad, pitch_demand_rad : NaN if none
+    (in inverted flight the bank is beyond 90 degrees)
     """
 
     aileron: float
     elevator: float
     rudder: float
     throttle: float
-    mode: int = int(Mode.MANUAL)  # a plain int: numba takes tens of microseconds to look at an enum
+    mode: int = int(Mode.MANUAL)  # a plain int: numba needs tens of microseconds to unbox an enum
     bank_demand_rad: float = math.nan
     pitch_demand_rad: float = math.nan
 
@@ -138,8 +138,8 @@ NEUTRAL = ActuatorCommand(0.0, 0.0, 0.0, 0.0)
 
 @runtime_checkable
 class Autopilot(Protocol):
-    """The seam.  Optional: ``reset()``, called before each flight."""
+    """Interface of every autopilot.  Optional: ``reset()``, called before each flight."""
 
     def update(self, estimate: AttitudeEstimate, m: Measurements, setpoint: Setpoint) -> ActuatorCommand:
-        """Steer.  Attitude comes from `estimate` alone; position, height and ground velocity from `m`."""
+        """Compute the command.  Attitude comes only from `estimate`; position, height and ground velocity from `m`."""
         ...

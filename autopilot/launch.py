@@ -1,7 +1,7 @@
-"""The hand launch: the motor waits for the throw, then climbs straight ahead to the height.
+"""The hand launch: motor off until the throw, then a straight climb to the height.
 
-The throw is felt as acceleration along the nose.  Gravity is taken off with the matrix, so that a nose held
-high in the hand is not a throw; sway and knocks are short against the mean that is judged.
+The throw is detected by the acceleration along the nose.  Gravity is removed with the matrix, so that a raised nose is
+not a throw; the acceleration is averaged against sway and knocks.
 """
 
 import math
@@ -16,13 +16,16 @@ from estimator.params.shared import FORCE_RANGE_M_S2
 
 @dataclass(frozen=True, slots=True)
 class LaunchParams:
-    """When it is a throw, and how to climb away.
+    """Throw detection and climb.
 
-    throw_m_s2, throw_mean_s : mean acceleration along the nose that is a throw, time constant of that mean
-    motor_delay_s : from the throw felt to full throttle; it has no thrust before the hand is gone
-    full_throttle_s : after the throw the throttle is that of the climb at cruise speed
-    level_off_m : below the height, where the climb at constant pitch ends and the height loop takes over
-    climb_pitch_rad : demanded from the hand to the height
+    throw_m_s2 : mean acceleration along the nose of a throw (m/s2, default 0.8 g).  Higher: gentle throws are missed;
+        lower: handling starts the motor
+    throw_mean_s : time constant of that mean (s, default 0.1).  Higher: detects later; lower: knocks count
+    motor_delay_s : from detection to full throttle (s, default 0.1).  Higher: safer for the hand, but sinks more
+    full_throttle_s : full throttle until this time after the throw, then that of the climb at cruise speed (s,
+        default 2).  Higher: more speed before the climb
+    level_off_m : the height loop takes over this far below the height (m, default 5).  Higher: smoother, slower
+    climb_pitch_rad : pitch of the climb (rad, default 12 deg).  Higher: steeper and slower, up to the stall
     """
 
     throw_m_s2: float = 0.8 * G_M_S2
@@ -35,13 +38,13 @@ class LaunchParams:
 
 @kernel
 def feel_throw(R_eb, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Seconds since the throw was felt, negative where it has not been; call once per tick.
+    """Seconds since the throw was detected, negative before; call once per tick.
 
     R_eb : shape (3, 3)   row : measured   s : record with `felt_m_s2`, `thrown_s`, updated
     """
     if s.thrown_s >= 0.0:
         s.thrown_s += dt_s
-    elif abs(row.force_b_m_s2[0]) <= FORCE_RANGE_M_S2:  # beyond, and NaN, is no measurement and no throw
+    elif abs(row.force_b_m_s2[0]) <= FORCE_RANGE_M_S2:  # larger ones and NaN are invalid measurements
         # Specific force is acceleration minus gravity; gravity along the nose is g r_zx.
         along_nose = row.force_b_m_s2[0] + G_M_S2 * R_eb[2, 0]
         s.felt_m_s2 += (along_nose - s.felt_m_s2) * dt_s / (p.throw_mean_s + dt_s)
@@ -52,9 +55,9 @@ def feel_throw(R_eb, row, s, p, dt_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def climb_away(thrown_s, height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Pitch demand, rad, and throttle, 0..1, of a launch; wings level is the caller's.
+    """Pitch demand, rad, and throttle, 0..1, of a launch; the caller keeps the wings level.
 
-    Waiting, motor off; thrown, full throttle and the climb; near the height, the height loop for good.
+    Motor off before the throw; then full throttle and climb; near the height, the height loop.
 
     thrown_s : since the throw, or negative   height_m : demanded   s : record with `levelled_off`, updated
     p : record of AutopilotParams
@@ -62,7 +65,7 @@ def climb_away(thrown_s, height_m, row, s, p, dt_s):  # type: ignore[no-untyped-
     launch = p.launch
     if thrown_s < 0.0:
         return launch.climb_pitch_rad, 0.0
-    if height(row, p.guidance) > height_m - launch.level_off_m:  # False where there is no height
+    if height(row, p.guidance) > height_m - launch.level_off_m:  # False if the height is unknown
         s.levelled_off = 1
     if s.levelled_off:
         return hold_height(height_m, row, s, p, dt_s)

@@ -10,11 +10,12 @@ from estimator.compiler.jit import kernel
 class MixerParams:
     """Trim and mixing.
 
-    aileron_trim, elevator_trim, rudder_trim : deflection of hands-off level flight at cruise, -1..1
-    rudder_per_roll : rudder that goes with roll control: against the adverse yaw of ailerons, or, where there are
-        none, all of it: the rudder slips the aeroplane, and the dihedral rolls it out of the slip
-    aileron_limit, elevator_limit, rudder_limit, throttle_limit : 0..1, the most of its travel that each is given;
-        0 where it is not fitted
+    aileron_trim, elevator_trim, rudder_trim : deflection in level flight at cruise, -1..1 (default 0).  Wrong ones
+        must be learnt by the integrators
+    rudder_per_roll : rudder per roll control (default 0.4): against adverse yaw, or 1 without ailerons, to roll by
+        sideslip and dihedral.  Higher: turns skid; lower: they slip
+    aileron_limit, elevator_limit, rudder_limit, throttle_limit : largest command, 0..1; 0 if not fitted (default 1).
+        Lower: less control authority
     """
 
     aileron_trim: float = 0.0

@@ -1,16 +1,16 @@
-"""Stabilisation straight from the rows of the direction cosine matrix: no Euler angles, any attitude.
+"""Stabilisation from the rows of the direction cosine matrix, without Euler angles, at any attitude.
 
-Two loops.  The outer one turns a demanded bank and pitch into demanded body rates; the inner one, which a
-scripted stick uses alone, turns body rates into controls.
+Two loops: the outer one converts demanded bank and pitch to demanded body rates; the inner one, used alone in RATE,
+converts body rates to controls.
 
-The *mixing problem* of Premerlani & Bizard (a bank puts the rate of the turn into the pitch gyro, and a
-level turn needs up-elevator) has one answer for both halves.  A turn about the vertical, seen in the body,
-is ``turn rate * r_z`` (third row of the matrix): what the pitch gyro reads of it is demanded, not damped; and
-the lift that a demanded pitch rate needs, ``V q / g + r_zz``, is the up-elevator (1 / r_zz in a level turn).
+The *mixing problem* of Premerlani & Bizard (in a bank the pitch gyro senses the turn, and a level turn needs
+up-elevator) has one solution for both parts.  A turn about the vertical in body axes is ``turn rate * r_z`` (third row
+of the matrix): that pitch rate is demanded, not damped; and the lift of a demanded pitch rate, ``V q / g + r_zz``,
+gives the up-elevator (1 / r_zz in a level turn).
 
-Inverted flight is upright flight in axes turned half round the nose, ``(r_zx, -r_zy, -r_zz)``: that row, `leaning`,
-is what bank and pitch are counted from.  Rolling and the turn about the vertical mean the same in both, pitching
-the opposite; the lift that carries the weight, ``r_zz``, comes out negative by itself.
+Inverted flight is upright flight in axes rotated by 180 degrees about the nose, ``(r_zx, -r_zy, -r_zz)``: bank and
+pitch are relative to that row, `leaning`.  Roll and the turn about the vertical keep their sign, pitch is reversed;
+the lift that carries the weight, ``r_zz``, becomes negative.
 
 Source: Premerlani & Bizard, Direction Cosine Matrix IMU: Theory, "Using DCM in control and navigation", 1-5.
 """
@@ -25,20 +25,25 @@ from estimator.interface import G_M_S2
 
 @dataclass(frozen=True, slots=True)
 class StabiliseParams:
-    """Gains of the two loops; the defaults fly the aeroplane `endurance`.
+    """Gains of the two loops; the defaults are for the aeroplane `endurance`.
 
-    airspeed_m_s : of cruise; stands in for the airspeed nobody measures
-    roll_gain_1_s, pitch_gain_1_s : rate demanded per sine of the error; larger is quicker, then nervous
-    roll_rate_limit_rad_s, pitch_rate_limit_rad_s : the most the outer loop asks for; a rate beyond what the gyros
-        can tell is never seen to be there, and is flown with full deflection for ever
-    recovery_pitch_rate_rad_s : the same with the nose far off
-    roll_control_per_rate_s, .._per_rate_error_s, .._per_error : feed-forward, damping, integral; what moves, ailerons
-        or a rudder that rolls by way of the dihedral, is the mixer's business
-    elevator_per_pitch_rate_s, .._per_rate_error_s, .._per_pitch_error : the same
-    elevator_per_load : up-elevator per extra g of lift        load_limit : the extra g it answers to at most
-    inverted_lift : lift towards the wheels that the wing has, in units of the weight at cruise; beyond, it stalls
-    rudder_per_yaw_rate_s, rudder_per_rate_error_s : feed-forward and damping; no integral
-    integral_limit : deflection that the integrals may hold, against motor torque and trim
+    airspeed_m_s : cruise speed, for which the gains hold (m/s, default 12.6).  Higher: larger deflections
+    roll_gain_1_s, pitch_gain_1_s : rate demand per sine of the error (1/s, default 3 and 2.5).  Higher: faster, then
+        oscillates; lower: sluggish
+    roll_rate_limit_rad_s, pitch_rate_limit_rad_s : of the outer loop (rad/s, default 1.5 and 0.8).  Higher: faster
+        large changes; must stay within the gyro range, or full deflection persists.  Lower: gentler
+    recovery_pitch_rate_rad_s : pitch rate limit far from the demand (rad/s, default 1.4).  Higher: faster recovery
+    roll_control_per_rate_s, roll_control_per_rate_error_s, roll_control_per_error : feed-forward (s), damping (s) and
+        integral gain in roll (default 0.3, 0.12, 0.12).  Higher: stiffer, then oscillates; lower: drifts, overshoots
+    elevator_per_pitch_rate_s, elevator_per_rate_error_s, elevator_per_pitch_error : the same in pitch (default 0.25,
+        0.35, 1)
+    elevator_per_load : up-elevator per extra g of lift (default 0.155).  Higher: climbs in turns; lower: sinks
+    load_limit : largest extra g compensated (default 3).  Lower: the nose drops in steep turns
+    inverted_lift : lift available inverted, over the weight at cruise (default 1.3).  Higher: may stall inverted
+    rudder_per_yaw_rate_s, rudder_per_rate_error_s : feed-forward and damping in yaw (s, default 0.1 and 0.3).  Higher:
+        less sideslip in turns, then tail-wag
+    integral_limit : largest deflection of the integrators (default 0.3).  Higher: more trim and motor torque can be
+        learnt, and more wound up
     """
 
     airspeed_m_s: float = 12.6
@@ -63,10 +68,10 @@ class StabiliseParams:
 
 @kernel
 def shorter_way(sine, cosine, leaning):  # type: ignore[no-untyped-def]
-    """Size of an error, -1..1, from its sine and cosine: the sine itself, and full beyond 90 degrees.
+    """Error, -1..1, from its sine and cosine: the sine up to 90 degrees, +-1 beyond.
 
     sine, cosine : of the error, from a cross and a dot product
-    leaning : the way things go now, a hint; decides near 180 degrees, where noise would toss a coin every tick
+    leaning : present tendency, which decides near 180 degrees, where noise would change the sign every tick
     """
     if cosine >= 0.0:
         return clip(sine, -1.0, 1.0)
@@ -75,19 +80,19 @@ def shorter_way(sine, cosine, leaning):  # type: ignore[no-untyped-def]
 
 @kernel
 def leaning(R_eb, up):  # type: ignore[no-untyped-def]
-    """(r_zy, r_zz) as seen by a pilot whose head points up in the flight wanted: `up` 1 upright, -1 inverted."""
+    """(r_zy, r_zz) relative to the demanded flight: `up` 1 upright, -1 inverted."""
     return up * R_eb[2, 1], up * R_eb[2, 2]
 
 
 @kernel
 def roll_error(R_eb, omega_b_rad_s, bank_rad, up):  # type: ignore[no-untyped-def]
-    """How far to roll, -1..1, positive to the right: the sine of the missing bank, times the cosine of pitch.
+    """Roll error, -1..1, positive to the right: the sine of the bank error times the cosine of pitch.
 
-    Cross product of the demanded and the actual vertical in the plane of the wings, (r_zy, r_zz): for wings
-    level it is -r_zy.  More than 90 degrees away, upside down above all, it saturates the shorter way round.
+    Cross product of the demanded and the actual vertical in the y-z plane, (r_zy, r_zz): -r_zy for wings level.  Beyond
+    90 degrees, for example inverted, it saturates in the shorter direction.
 
     R_eb : shape (3, 3)   omega_b_rad_s : shape (3,)   bank_rad : the demand, within +-90 degrees
-    up : 1 upright, -1 where the bank counts from inverted flight
+    up : 1 upright, -1 if the bank is relative to inverted flight
     """
     r_zy, r_zz = leaning(R_eb, up)
     sine = math.sin(bank_rad) * r_zz - math.cos(bank_rad) * r_zy
@@ -97,10 +102,10 @@ def roll_error(R_eb, omega_b_rad_s, bank_rad, up):  # type: ignore[no-untyped-de
 
 @kernel
 def turn_rate(R_eb, up, airspeed_m_s):  # type: ignore[no-untyped-def]
-    """Rate of the coordinated level turn that belongs to the bank, g tan(bank) / V, rad/s.
+    """Rate of the coordinated level turn at the present bank, g tan(bank) / V, rad/s.
 
-    0 where the lift points down: upside down, or upright while inverted flight is wanted.  The tangent
-    r_zy / r_zz, the same from either side, is held beyond 60 degrees of bank, where no level turn is flown.
+    0 if the lift points down: inverted, or upright while inverted flight is demanded.  The tangent r_zy / r_zz is
+    limited beyond 60 degrees of bank, where level turns are not flown.
     """
     r_zy, r_zz = leaning(R_eb, up)
     if r_zz <= 0.0:
@@ -110,19 +115,19 @@ def turn_rate(R_eb, up, airspeed_m_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def far_off(sine):  # type: ignore[no-untyped-def]
-    """How unusual a pitch is, 0..1, from its sine less that of the demand: from 20 degrees off, wholly at 45."""
+    """Weight of a large pitch error, 0..1, from the difference of sines: 0 up to 20 degrees, 1 from 45."""
     return clip((abs(sine) - 0.35) / 0.35, 0.0, 1.0)
 
 
 @kernel
 def rate_demand(R_eb, omega_b_rad_s, bank_rad, pitch_rad, up, airspeed_m_s, p):  # type: ignore[no-untyped-def]
-    """Body rates (p, q, r), rad/s, that bring about and then hold a bank and a pitch.
+    """Body rates (p, q, r), rad/s, that reach and hold a bank and a pitch.
 
-    The coordinated turn, ``turn rate * r_z``, plus what the errors ask for.  The nose is raised by the elevator
-    only as far as the lift points up: upside down the aeroplane rolls first.
+    The coordinated turn, ``turn rate * r_z``, plus rates from the errors.  The elevator raises the nose only as far as
+    the lift points up: if inverted, the aeroplane rolls first.
 
-    R_eb : shape (3, 3)   bank_rad, pitch_rad : demanded, a positive bank turns right over the ground either way
-    up : 1 upright, -1 inverted   airspeed_m_s : believed   p : record of StabiliseParams
+    R_eb : shape (3, 3)   bank_rad, pitch_rad : demanded; a positive bank turns right over the ground in both cases
+    up : 1 upright, -1 inverted   airspeed_m_s : known or assumed   p : record of StabiliseParams
     """
     r_zx, r_zy, r_zz = R_eb[2, 0], R_eb[2, 1], R_eb[2, 2]
     turn = turn_rate(R_eb, up, airspeed_m_s)
@@ -138,10 +143,10 @@ def rate_demand(R_eb, omega_b_rad_s, bank_rad, pitch_rad, up, airspeed_m_s, p): 
 
 @kernel
 def extra_lift(pitch_rate_rad_s, r_zz, airspeed_m_s, p):  # type: ignore[no-untyped-def]
-    """Lift coefficient in units of that at cruise, less its 1, for a pitch rate: (V q / g + r_zz) (V_c / V)^2 - 1.
+    """Lift coefficient of a pitch rate over that at cruise, minus 1: (V q / g + r_zz) (V_c / V)^2 - 1.
 
     At cruise speed it is the extra load factor: 1 / r_zz - 1 in a level turn, V q / g at the bottom of a loop,
-    V q / g - 2 at its top, -2 in level flight on the back.
+    V q / g - 2 at its top, -2 in inverted level flight.
     """
     load = airspeed_m_s * pitch_rate_rad_s / G_M_S2 + r_zz
     slower = p.airspeed_m_s / airspeed_m_s
@@ -150,7 +155,7 @@ def extra_lift(pitch_rate_rad_s, r_zz, airspeed_m_s, p):  # type: ignore[no-unty
 
 @kernel
 def hold(integral, error, gain, control, limit, dt_s):  # type: ignore[no-untyped-def]
-    """The integral after one tick; it waits while `control` is at its stop in the direction of the error."""
+    """The integral after one tick; frozen while `control` is saturated in the direction of the error."""
     if (control >= 1.0 and error > 0.0) or (control <= -1.0 and error < 0.0):
         return integral
     return clip(integral + gain * error * dt_s, -limit, limit)
@@ -158,12 +163,12 @@ def hold(integral, error, gain, control, limit, dt_s):  # type: ignore[no-untype
 
 @kernel
 def rate_control(demand, R_eb, omega_b_rad_s, airspeed_m_s, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Roll, pitch and yaw control, about -1..1, that make the body follow the demanded rates.
+    """Roll, pitch and yaw control, about -1..1, to follow the demanded rates.
 
-    The integral of a rate error is an angle held: it takes up motor torque, trim, and a gyro bias.  The gains are
-    those of cruise.  A deflection makes a moment ~ V^2 against a damping ~ V: for the same rate it goes with 1 / V.
+    The integral of a rate error holds an angle; it compensates motor torque, trim and gyro bias.  The gains are those
+    of cruise: a deflection gives a moment ~ V^2 against damping ~ V, so that it scales with 1 / V for the same rate.
 
-    demand : (p, q, r), rad/s   omega_b_rad_s : shape (3,), drift-corrected   airspeed_m_s : believed
+    demand : (p, q, r), rad/s   omega_b_rad_s : shape (3,), drift-corrected   airspeed_m_s : known or assumed
     s : record with `roll_integral`, `pitch_integral`, updated   p : record of StabiliseParams
     """
     slower = p.airspeed_m_s / airspeed_m_s

@@ -1,9 +1,9 @@
-"""Rates of the loop: everything happens on integer ticks of the physics."""
+"""Rates of the loop, all on integer steps of the physics."""
 
 from dataclasses import dataclass
 from fractions import Fraction
 
-_SAMPLED_HZ = (1, 2, 2.5, 4, 5, 8, 10, 12.5, 20, 25, 40, 50, 100, 200)  # what a refused rate is told to try
+_SAMPLED_HZ = (1, 2, 2.5, 4, 5, 8, 10, 12.5, 20, 25, 40, 50, 100, 200)  # suggested for an invalid rate
 
 
 def _divides(rate_hz: float, base_hz: int) -> bool:
@@ -12,10 +12,10 @@ def _divides(rate_hz: float, base_hz: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """Physics, inertial and GPS rates in hertz; the slower ones divide the physics rate.
+    """Physics, inertial and GPS rates in hertz; inertial and GPS rate divide the physics rate.
 
-    A tick of the loop is one inertial sample (estimator and autopilot run once per tick); a GPS report may fall
-    between two ticks and is delivered in the tick that ends at or after its arrival.
+    A tick of the loop is one inertial sample; estimator and autopilot run once per tick.  A GPS report that falls
+    between two ticks is delivered in the first tick that ends at or after its arrival.
     """
 
     physics_hz: int = 200
@@ -33,8 +33,8 @@ class Rates:
             if rate not in possible:
                 names = ", ".join(str(c) for c in possible)
                 raise ValueError(
-                    f"{what} {rate:g} Hz does not divide the physics rate of {self.physics_hz} Hz "
-                    f"into whole steps that are supported: choose {names} Hz"
+                    f"{what} {rate:g} Hz does not divide the physics rate of {self.physics_hz} Hz into a supported "
+                    f"number of steps: choose {names} Hz"
                 )
 
     @property
@@ -44,7 +44,7 @@ class Rates:
 
     @property
     def steps_per_tick(self) -> int:
-        """Physics steps in a tick."""
+        """Physics steps per tick."""
         return self.physics_hz // self.imu_hz
 
     @property
@@ -53,7 +53,7 @@ class Rates:
         return int(Fraction(self.physics_hz) / Fraction(str(self.gps_hz)))
 
     def steps_per_sample(self, what: str, rate_hz: float) -> int:
-        """Physics steps between two samples of the sensor `what`, which reports at `rate_hz`, once a tick at most.
+        """Physics steps between two samples of the sensor `what` at `rate_hz`, at most one sample per tick.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What happened in a flight, read from its log afterwards: phases, modes, the GPS, the end."""
+"""Events of a flight, read from its log afterwards: phases, modes, GPS, faults, the end."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -11,7 +11,7 @@ from estimator.interface import Health
 from sim.log import Event, Flight, Log, Outcome, Phase
 from sim.sensors.faults import Fault
 
-_GPS_SILENCE_S = 2.5  # without a fix for longer, the GPS counts as lost
+_GPS_SILENCE_S = 2.5  # the GPS counts as lost after this long without a fix
 _PHASES = {
     Phase.HELD: "held in the hand",
     Phase.THROWN: "thrown",
@@ -20,18 +20,18 @@ _PHASES = {
 }
 _FAILSAFES = {
     Mode.CIRCLE: "no GPS",
-    Mode.GLIDE: "no GPS for long",
+    Mode.GLIDE: "no GPS for a long time",
     Mode.LEVEL: "estimator unhealthy",
-    Mode.LOW: "too near the ground",
+    Mode.LOW: "too close to the ground",
 }
 
 
 def events_of(
     log: Log, outcome: Outcome, message: str, script: Script | None = None, release_s: float = 0.0
 ) -> tuple[Event, ...]:
-    """Events of `log` in order of time; the last one says how the flight ended where that was not as planned.
+    """Events of `log` in order of time; the last one says how the flight ended, if not as planned.
 
-    script, release_s : what was asked for, by time since the release; a mode that nobody asked for says why
+    script, release_s : setpoints by time since the release; a mode other than that commanded gives its reason
     """
     if len(log) == 0:
         return (Event(0.0, message or outcome, "error"),) if outcome != Outcome.COMPLETED else ()
@@ -66,18 +66,18 @@ def events_of(
 
 
 def _mode_event(mode: Mode, t_s: float, script: Script | None, release_s: float) -> Event:
-    """The mode that came into force at `t_s`; a warning, with the reason, where that is a failsafe."""
-    asked = script.at(t_s - release_s) if script is not None else None
+    """The mode that became active at `t_s`; a warning with the reason for a failsafe."""
+    setpoint = script.at(t_s - release_s) if script is not None else None
     text, reason = f"mode {mode.name.lower()}", _FAILSAFES.get(mode, "")
-    if asked is not None and asked.mode == mode:
+    if setpoint is not None and setpoint.mode == mode:
         reason = ""
-    elif asked is not None and not asked.radio and mode == Mode.RETURN:
+    elif setpoint is not None and not setpoint.radio and mode == Mode.RETURN:
         reason = "no radio"
     return Event(t_s, f"{text}: {reason}", "warn") if reason else Event(t_s, text)
 
 
 def _radio_events(script: Script | None, release_s: float, last_s: float) -> list[Event]:
-    """Where the pilot stops being heard, and is heard again."""
+    """Loss and return of the radio link."""
     events, heard = [], True
     for t_s, setpoint in script or ():
         if setpoint.radio != heard:
@@ -87,10 +87,10 @@ def _radio_events(script: Script | None, release_s: float, last_s: float) -> lis
 
 
 def events_of_faults(faults: Sequence[Fault], flight: Flight) -> tuple[Event, ...]:
-    """Where each fault of the sensors begins and ends, as far as `flight` got; from power-up at the earliest."""
+    """Start and end of each sensor fault within `flight`, not before power-up."""
     last_s = float(flight.log.truth["t_s"][-1]) if len(flight.log) else 0.0
     events = []
     for fault in faults:
         begins_s, ends_s = max(flight.release_s + fault.from_s, 0.0), flight.release_s + fault.to_s
-        events += [Event(begins_s, f"fault {fault}", "warn"), Event(ends_s, f"fault {fault} over")]
+        events += [Event(begins_s, f"fault {fault}", "warn"), Event(ends_s, f"fault {fault} ended")]
     return tuple(event for event in events if event.t_s <= last_s)

@@ -1,7 +1,7 @@
-"""The border between the loop and flight code: what is asked of it, and what is accepted as an answer.
+"""Calls of flight code and the checks of its results.
 
-Estimators and autopilots may be anyone's.  One that raises, or answers with something that is no rotation or no
-command, ends the flight with a line that names the class, the time, the fault, and the line of its file.
+Estimators and autopilots may be user code.  One that raises, or returns something that is not a rotation or not a
+command, ends the flight with a message that names the class, the time, the fault and the line of its file.
 """
 
 import operator
@@ -14,39 +14,39 @@ from autopilot.interface import ActuatorCommand, Autopilot, Mode, Setpoint
 from estimator.compiler.jit import kernel
 from estimator.interface import Array, AttitudeEstimate, AttitudeEstimator, HeadingReference, Health, Measurements
 from sim.log import Outcome
-from sim.outside.blame import Refused, home_of, shown, theirs, told
+from sim.outside.blame import Refused, home_of, shown, summary, theirs
 from sim.outside.signals import check
 from sim.outside.wording import class_name
 
 N_HEALTH, N_MODES = len(Health), len(Mode)
-ROTATION_TOLERANCE = 1e-2  # largest |R R^T - I| that is still taken for a rotation
+ROTATION_TOLERANCE = 1e-2  # largest |R R^T - I| accepted as a rotation
 _UNKNOWN_WIND = np.full(3, np.nan)
-LARGEST = 1e6  # rad/s, m/s: a rate, bias or wind beyond it is none
+LARGEST = 1e6  # rad/s, m/s: of a valid rate, bias or wind
 _FAULTS = {
     2: "R_eb is not finite",
-    3: f"R_eb is no rotation: |R R^T - I| above {ROTATION_TOLERANCE:g}, or a reflection",
+    3: f"R_eb is not a rotation: |R R^T - I| above {ROTATION_TOLERANCE:g}, or a reflection",
     4: f"omega_b_rad_s is not finite, or beyond {LARGEST:g} rad/s",
     5: f"gyro_bias_b_rad_s is not finite, or beyond {LARGEST:g} rad/s",
-    6: f"health is no Health: {', '.join(f'{h} {h.name}' for h in Health)}",
+    6: f"health is not a Health: {', '.join(f'{h} {h.name}' for h in Health)}",
     7: f"wind_e_m_s is beyond {LARGEST:g} m/s",
 }
 _COMMAND_FAULTS = {
     1: "aileron {0:g}, elevator {1:g}, rudder {2:g}, throttle {3:g}: must be within -1..1, the throttle within 0..1",
-    2: f"mode {{0}} is no Mode: {', '.join(f'{m} {m.name}' for m in Mode)}",
+    2: f"mode {{0}} is not a Mode: {', '.join(f'{m} {m.name}' for m in Mode)}",
 }
 _VECTORS = ((3, 3), (3,), (3,), (3,))
 _COLUMNS = dict(
     zip(("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "wind_e_m_s", "health"), (*_VECTORS, ()), strict=True)
 )
-_ndarray = np.ndarray  # a global costs half of an attribute
+_ndarray = np.ndarray  # faster than the attribute
 
 
 class Unusable(Refused):
-    """An answer of flight code that is no estimate or no command."""
+    """A result of flight code that is not a valid estimate or command."""
 
 
 class FlightCodeFailed(RuntimeError):
-    """An estimator or autopilot raised or gave an unusable answer; `outcome` says which of the two."""
+    """An estimator or autopilot raised or returned an invalid result; `outcome` says which of the two."""
 
     def __init__(self, outcome: Outcome, who: object, t_s: float, fault: str) -> None:
         super().__init__(f"{class_name(who)} at {t_s:.2f} s: {fault}")
@@ -55,7 +55,7 @@ class FlightCodeFailed(RuntimeError):
 
 @kernel
 def _record_estimate(flown, k, R_eb, omega, bias, wind, health):  # type: ignore[no-untyped-def]
-    """Write the estimate into row `k`; returns 0, or the number of the fault."""
+    """Write the estimate into row `k`; returns 0 or the number of the fault."""
     row = flown[k]
     worst = 0.0
     for i in range(3):
@@ -82,14 +82,14 @@ def _record_estimate(flown, k, R_eb, omega, bias, wind, health):  # type: ignore
             return 4
         if not abs(bias[i]) <= LARGEST:
             return 5
-        if abs(wind[i]) > LARGEST:  # NaN is where it is not known
+        if abs(wind[i]) > LARGEST:  # NaN: unknown
             return 7
     return 0
 
 
 @kernel
 def _record_estimates(flown, R_eb, omega, bias, wind, health):  # type: ignore[no-untyped-def]
-    """Write an estimate into every row; returns the row of the first fault, and its number or 0."""
+    """Write an estimate into every row; returns the row of the first fault and its number, or 0."""
     for k in range(len(flown)):
         fault = _record_estimate(flown, k, R_eb[k], omega[k], bias[k], wind[k], health[k])
         if fault:
@@ -99,21 +99,21 @@ def _record_estimates(flown, R_eb, omega, bias, wind, health):  # type: ignore[n
 
 @kernel
 def _record_command(flown, k, aileron, elevator, rudder, throttle, mode, bank, pitch):  # type: ignore[no-untyped-def]
-    """Write the command into row `k`; returns 0, or the number of the fault."""
+    """Write the command into row `k`; returns 0 or the number of the fault."""
     row = flown[k]
     row.aileron, row.elevator, row.rudder, row.throttle = aileron, elevator, rudder, throttle
     row.bank_demand_rad, row.pitch_demand_rad = bank, pitch
-    if not 0 <= mode < N_MODES or mode != int(mode):  # NaN is none
+    if not 0 <= mode < N_MODES or mode != int(mode):  # rejects NaN
         return 2
     row.mode = mode
     within = abs(aileron) <= 1.0 and abs(elevator) <= 1.0 and abs(rudder) <= 1.0 and 0.0 <= throttle <= 1.0
-    return 0 if within else 1  # NaN is not within
+    return 0 if within else 1  # NaN fails
 
 
 def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> AttitudeEstimate:
-    """Write estimate `e` into row `k` of `flown`; Unusable where it is none.
+    """Write estimate `e` into row `k` of `flown`; Unusable if it is invalid.
 
-    Returns `e`, or what it says in arrays of floats where it was given in lists or the like.
+    Returns `e`, converted to float arrays if it was given as lists or the like.
     """
     if type(e) is not AttitudeEstimate:
         raise Unusable(f"update() returned {class_name(e)}, must return an AttitudeEstimate")
@@ -132,7 +132,7 @@ def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> Attitud
             return e
     except Unusable:
         raise
-    except Exception:  # arrays of anything: what is wrong with them is found below
+    except Exception:  # arrays of any kind: checked in detail below
         pass
     e = _plain_estimate(e)
     fault = _record_estimate(
@@ -145,15 +145,15 @@ def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> Attitud
 
 
 def record_estimates(flown: NDArray[Any], estimates: object) -> tuple[int, str]:
-    """Write what a ``replay()`` returned into `flown`, row by row as `record_estimate` would.
+    """Write the result of a ``replay()`` into `flown`, row by row as `record_estimate` would.
 
     Returns
     -------
-    the number of good rows, and what is wrong with the next one; empty where all are good
+    the number of valid rows, and the fault of the next one, empty if all are valid
 
     Raises
     ------
-    Unusable      `estimates` is no structured array of as many rows
+    Unusable      `estimates` is not a structured array of that many rows
     """
     n = len(flown)
     right = f"must return a structured array of {n} rows with {', '.join(_COLUMNS)}"
@@ -171,7 +171,7 @@ def record_estimates(flown: NDArray[Any], estimates: object) -> tuple[int, str]:
 
 
 def _plain_estimate(e: AttitudeEstimate) -> AttitudeEstimate:
-    """`e` in new arrays of floats; Unusable where these are no numbers, or not as many as there must be."""
+    """`e` in new float arrays; Unusable for other types or shapes."""
     if len(e) != len(AttitudeEstimate._fields):
         raise Unusable(f"the AttitudeEstimate has {len(e)} fields, must have {len(AttitudeEstimate._fields)}")
     R_eb, omega, bias = (_numbers(name, e[i], _VECTORS[i]) for i, name in enumerate(AttitudeEstimate._fields[:3]))
@@ -184,7 +184,7 @@ def _plain_estimate(e: AttitudeEstimate) -> AttitudeEstimate:
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Array:
-    """`value` as an array of floats of that shape, a copy; Unusable where it is none."""
+    """`value` as a new float array of that shape; Unusable if it is not one."""
     array = np.asarray(value)
     if array.shape != shape:
         raise Unusable(f"{name} has shape {array.shape}, must have shape {shape}")
@@ -192,21 +192,21 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Array:
         raise Unusable(f"{name} is made of {array.dtype}, must be made of numbers")
     if np.ma.isMaskedArray(value) and np.ma.getmaskarray(value).any():
         raise Unusable(f"{name} has masked elements")
-    with np.errstate(over="ignore"):  # beyond a float is infinite, and refused as that
+    with np.errstate(over="ignore"):  # too large a number becomes infinite and is rejected
         return np.array(array, dtype=np.float64, order="C")
 
 
 def record_command(flown: NDArray[Any], k: int, command: ActuatorCommand) -> ActuatorCommand:
-    """Write `command` into row `k` of `flown`; Unusable where it is none.
+    """Write `command` into row `k` of `flown`; Unusable if it is invalid.
 
-    Returns `command`, or what it says in floats where it was given in something else.
+    Returns `command`, converted to floats if it was given as another type.
     """
     if type(command) is not ActuatorCommand:
         raise Unusable(f"update() returned {class_name(command)}, must return an ActuatorCommand")
     try:
         if not _record_command(flown, k, *command):
             return command
-    except Exception:  # fields of anything: what is wrong with them is found below
+    except Exception:  # fields of any kind: checked in detail below
         pass
     command = _plain_command(command)
     fault = _record_command(flown, k, *command)
@@ -216,7 +216,7 @@ def record_command(flown: NDArray[Any], k: int, command: ActuatorCommand) -> Act
 
 
 def _plain_command(command: ActuatorCommand) -> ActuatorCommand:
-    """`command` in floats and an int; Unusable where these are no numbers."""
+    """`command` in floats and an int; Unusable for other types."""
     names = ActuatorCommand._fields
     if len(command) != len(names):
         raise Unusable(f"the ActuatorCommand has {len(command)} fields, must have {len(names)}")
@@ -239,7 +239,7 @@ def _plain_command(command: ActuatorCommand) -> ActuatorCommand:
 
 
 def reference_of(estimator: object) -> HeadingReference:
-    """What the heading of `estimator` converges to, the course where it does not say; Unusable where it is neither."""
+    """What the heading of `estimator` converges to, by default the course; Unusable if neither course nor nose."""
     reference = getattr(estimator, "heading_reference", "course")
     if issubclass(type(reference), str):
         if str.__eq__(reference, "course"):
@@ -250,22 +250,22 @@ def reference_of(estimator: object) -> HeadingReference:
 
 
 def blaming(outcome: Outcome, who: object, t_s: float) -> theirs:
-    """Turn whatever `who` raises inside the block into a FlightCodeFailed: it is a result of the flight."""
+    """Turn any exception of `who` inside the block into a FlightCodeFailed, a result of the flight."""
     return theirs(lambda line: FlightCodeFailed(outcome, who, t_s, line), home_of(who))
 
 
 def _failure(outcome: Outcome, who: object, measured: Measurements, error: BaseException) -> FlightCodeFailed:
-    """What ends the flight of `who`; raises instead where it is the command that shall end, or the time that is up."""
-    check()  # flight code may have swallowed it, and raised something else
+    """The failure of `who`; raises instead if the command is interrupted or the time limit has passed."""
+    check()  # flight code may have caught it and raised something else
     try:
         t_s = measured.imu.t_s
-    except Exception:  # flight code was given these rows, and may have given them another shape
+    except Exception:  # flight code may have reshaped the rows it was given
         t_s = float("nan")
-    return FlightCodeFailed(outcome, who, t_s, told(error, home_of(who)))
+    return FlightCodeFailed(outcome, who, t_s, summary(error, home_of(who)))
 
 
 def estimate_of(estimator: AttitudeEstimator, measured: Measurements, flown: NDArray[Any], k: int) -> AttitudeEstimate:
-    """Ask the estimator for tick `k` and record what it says; FlightCodeFailed where that is unusable."""
+    """Run the estimator for tick `k` and record its estimate; FlightCodeFailed if that is invalid."""
     try:
         return record_estimate(flown, k, estimator.update(measured))
     except BaseException as error:
@@ -273,14 +273,10 @@ def estimate_of(estimator: AttitudeEstimator, measured: Measurements, flown: NDA
 
 
 def command_of(
-    autopilot: Autopilot,
-    estimate: AttitudeEstimate,
-    measured: Measurements,
-    setpoint: Setpoint,
-    flown: NDArray[Any],
-    k: int,
-) -> ActuatorCommand:
-    """Ask the autopilot for tick `k` and record what it commands; FlightCodeFailed where that is unusable."""
+    autopilot: Autopilot, estimate: AttitudeEstimate, measured: Measurements, setpoint: Setpoint,
+    flown: NDArray[Any], k: int,
+) -> ActuatorCommand:  # fmt: skip
+    """Run the autopilot for tick `k` and record its command; FlightCodeFailed if that is invalid."""
     try:
         return record_command(flown, k, autopilot.update(estimate, measured, setpoint))
     except BaseException as error:

@@ -1,11 +1,11 @@
-"""The log of a flight: three preallocated structured arrays, a row per tick, made from one table of columns.
+"""The log of a flight: three preallocated structured arrays, a row per tick, defined by one table of columns.
 
-``truth``     what only the simulator knows
-``measured``  what the sensors report; flight code sees these rows alone, read-only
-``flown``     what the estimator believed and the autopilot commanded
+``truth``     known only to the simulator
+``measured``  sensor outputs; the only rows flight code sees, read-only
+``flown``     estimates and commands
 
-Row k is the working memory and the record of tick k: recording costs nothing, and history (the latency of the
-GPS) is an earlier row.  The same tables name the Parquet columns.
+Row k is both working memory and record of tick k: recording is free, and history (such as GPS latency) is read from
+earlier rows.  The same tables name the Parquet columns.
 """
 
 from dataclasses import dataclass, field
@@ -19,12 +19,12 @@ from estimator.interface import MEASURED, MEASURED_DTYPE, Column, HeadingReferen
 
 
 class Phase(IntEnum):
-    """Where in its life a flight is."""
+    """Phase of a flight."""
 
     HELD = 0  # in the hand
     THROWN = 1  # being pushed
     FLYING = 2
-    RESTING = 3  # on a table, judged all the same
+    RESTING = 3  # on a table; judged like flying
 
 
 TRUTH = (
@@ -80,7 +80,7 @@ class Log:
 
     @classmethod
     def empty(cls, n_ticks: int) -> "Log":
-        """A log of `n_ticks` zeroed rows; the estimate starts as the identity, the wind as unknown."""
+        """A log of `n_ticks` zeroed rows; attitudes are the identity, wind and demands NaN."""
         log = cls(np.zeros(n_ticks, TRUTH_DTYPE), np.zeros(n_ticks, MEASURED_DTYPE), np.zeros(n_ticks, FLOWN_DTYPE))
         log.flown["R_eb"] = np.eye(3)
         log.flown["wind_e_m_s"] = log.flown["bank_demand_rad"][:, None] = np.nan
@@ -96,7 +96,7 @@ class Log:
 
 
 class Outcome(StrEnum):
-    """How a flight ended; the flight up to there is recorded and judged whatever it was."""
+    """How a flight ended; the flight up to then is recorded and judged in every case."""
 
     COMPLETED = "completed"
     GROUND_CONTACT = "ground_contact"
@@ -104,15 +104,15 @@ class Outcome(StrEnum):
     DIVERGED = "diverged"
     ESTIMATOR_FAILED = "estimator_failed"
     AUTOPILOT_FAILED = "autopilot_failed"
-    SCENARIO_FAILED = "scenario_failed"  # its script raised for this flight; nothing was flown
+    SCENARIO_FAILED = "scenario_failed"  # its script raised; nothing was flown
     TIMED_OUT = "timed_out"  # took longer than the wall-clock limit
-    WORKER_DIED = "worker_died"  # the process that flew it is gone; nothing of it is recorded
+    WORKER_DIED = "worker_died"  # the process that flew it ended; nothing is recorded
     INTERRUPTED = "interrupted"
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something worth a line in the recording; `t_s` since power-up."""
+    """An event of a flight; `t_s` since power-up."""
 
     t_s: float
     text: str
@@ -121,12 +121,12 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Flight:
-    """A flight that has been flown: what is recorded, judged and shown.
+    """A completed flight, to be recorded, judged and shown.
 
-    log : rows up to the end                 dt_s : tick length          release_s : judged times count from here
-    outcome, message : how it ended, and one line where it was not as planned
+    log : rows up to the end            dt_s : tick length            release_s : judged times count from here
+    outcome, message : how it ended, and one line if not as planned
     manifest : seed, resolved configuration, versions; JSON-serialisable
-    late : ticks in which the estimator took longer than the tick; of this machine and moment, so not recorded
+    late : ticks in which the estimator took longer than the tick; depends on the machine, so not recorded
     """
 
     log: Log

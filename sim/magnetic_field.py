@@ -1,7 +1,7 @@
 """The earth's magnetic field at a place and a date: the World Magnetic Model.
 
 NOAA and BGS, "The US/UK World Magnetic Model for 2025-2030" (WMM2025): a spherical harmonic expansion of degree 12
-with a linear change in time.  It knows the core's field alone; rocks and steel nearby add their own.
+with a linear change in time.  It covers the core field only, not local rocks or steel.
 """
 
 import math
@@ -18,7 +18,7 @@ EARLIEST_YEAR: Final = 2010.0  # of the older models, for the declination of rec
 
 
 def require_year(owner: str, year: float) -> None:
-    """Refuse a date that the model does not cover: ValueError."""
+    """Reject a date that the model does not cover: ValueError."""
     if not FIRST_YEAR <= year <= LAST_YEAR:
         raise ValueError(
             f"{owner} = {year!r} (decimal): choose {FIRST_YEAR:g} to {LAST_YEAR:g}, the world magnetic model's years"
@@ -27,7 +27,7 @@ def require_year(owner: str, year: float) -> None:
 
 @cache
 def _model(first_year: int = int(FIRST_YEAR)) -> Any:
-    from pygeomag import GeoMag  # here, so that a flight without a magnetometer does not load it
+    from pygeomag import GeoMag  # not loaded by a flight without a magnetometer
 
     return GeoMag(base_year=first_year)
 
@@ -48,7 +48,7 @@ def field_e_ut(latitude_deg: float, longitude_deg: float, height_m: float, year:
 
     Raises
     ------
-    ValueError      a place that is not on earth, or a date that the model does not cover
+    ValueError      no such place on earth, or a date that the model does not cover
     """
     require_year("year", year)
     for name, angle_deg, most_deg in (("latitude_deg", latitude_deg, 90.0), ("longitude_deg", longitude_deg, 180.0)):
@@ -57,7 +57,7 @@ def field_e_ut(latitude_deg: float, longitude_deg: float, height_m: float, year:
     if not -1e3 <= height_m <= 850e3:
         raise ValueError(f"height_m = {height_m!r} m: choose a height from -1000 to 850000 m, which the model covers")
     found = _model().calculate(glat=latitude_deg, glon=longitude_deg, alt=1e-3 * height_m, time=year)
-    field = 1e-3 * np.array([found.x, found.y, found.z])  # it gives nanotesla
+    field = 1e-3 * np.array([found.x, found.y, found.z])  # from nanotesla
     field.flags.writeable = False
     return field
 
@@ -70,11 +70,11 @@ def declination_rad(latitude_deg: float, longitude_deg: float, height_m: float, 
     ----------
     latitude_deg, longitude_deg     geodetic, -90..90 and -180..180
     height_m                        above the ellipsoid
-    year                            decimal; one outside 2010..2030 counts as the nearest of these
+    year                            decimal; clipped to 2010..2030
 
     Raises
     ------
-    ValueError      a place that is not on earth
+    ValueError      no such place on earth
     """
     if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0):
         raise ValueError(f"latitude {latitude_deg!r}, longitude {longitude_deg!r} deg: choose a place on earth")

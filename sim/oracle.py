@@ -1,6 +1,6 @@
-"""The estimator that returns the truth: it tells a fault of the control from a fault of the estimation.
+"""An estimator that returns the truth: it separates control errors from estimation errors.
 
-Not flight code: the loop shows it the log, as it shows it to nobody else.
+Not flight code: the loop gives it the log, and no other estimator.
 """
 
 from estimator.interface import AttitudeEstimate, HeadingReference, Measurements
@@ -16,17 +16,13 @@ class Oracle:
         self._log: Log | None = None
 
     def watch(self, log: Log) -> None:
-        """Be shown the log of the flight to come."""
+        """Read the truth from `log`, the log of the next flight."""
         self._log = log
 
     def update(self, m: Measurements) -> AttitudeEstimate:
         """The truth of this tick."""
         if self._log is None:
-            raise RuntimeError("the oracle was shown no log: call watch(log) before the flight")
+            raise RuntimeError("the oracle has no log: call watch(log) before the flight")
         row = self._log.truth[m.k]
-        return AttitudeEstimate(
-            row["R_eb"].copy(),
-            row["omega_b_rad_s"].copy(),
-            row["gyro_bias_b_rad_s"].copy(),
-            row["wind_e_m_s"].copy(),
-        )
+        names = ("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "wind_e_m_s")
+        return AttitudeEstimate(*(row[name].copy() for name in names))

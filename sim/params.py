@@ -1,4 +1,4 @@
-"""Parameter dataclasses by name: their fields with dots, values of the right type, and what a wrong name may mean."""
+"""Parameter dataclasses by dotted field names: units, typed values, changes, and suggestions for misspelt names."""
 
 import difflib
 import math
@@ -10,9 +10,9 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 from sim.outside.wording import brief
 
 T = TypeVar("T")
-_MOST_TOLD = 60  # names in one message; of more, those that begin alike are told as one
+_MOST_NAMES = 60  # in one message; beyond that, names with the same first part are listed as one
 
-# What the end of a field's name says about its unit; the first that fits counts.
+# Ends of field names and their units; the first match counts.
 _UNITS = (
     ("noise_density_deg_s_sqrt_hz", "deg/s/sqrt(Hz)"), ("noise_density_ug_sqrt_hz", "ug/sqrt(Hz)"),
     ("_deg_s_sqrt_s", "deg/s/sqrt(s)"), ("_ug_sqrt_s", "ug/sqrt(s)"), ("_deg_s_min", "deg/s/min"),
@@ -26,11 +26,11 @@ _UNITS = (
 
 
 def unit_of(name: str) -> str:
-    """Unit that the end of a field's name says, empty where it says none."""
+    """Unit given by the end of a field's name; empty if none."""
     return next((unit for end, unit in _UNITS if name.endswith(end)), "")
 
 
-# Fields whose names differ from another's of the same part by the unit alone.
+# Fields whose names differ from another field of the part only by the unit.
 _WORDS = {
     "wander_s": "wander time", "velocity_wander_s": "velocity wander time", "warming_s": "warming time",
     "motor_rpm": "motor speed", "vibration_deg_s": "vibration turning", "vibration_rpm": "vibration at speed",
@@ -38,9 +38,9 @@ _WORDS = {
 
 
 def words_of(name: str) -> str:
-    """What a field's name says besides its unit, as words: ``noise_density_ug_sqrt_hz`` is noise density.
+    """A field's name as words, without its unit: ``noise_density_ug_sqrt_hz`` is noise density.
 
-    Of the fields of a part no two have the same words.
+    No two fields of a part have the same words.
     """
     if name in _WORDS:
         return _WORDS[name]
@@ -52,23 +52,23 @@ def words_of(name: str) -> str:
 
 
 def near_misses(name: str, names: Iterable[str]) -> str:
-    """The end of a message about an unknown `name`: what it may have meant, or all there is."""
+    """End of a message about an unknown `name`: the most similar names, or all names."""
     possible = sorted(names)
-    slips = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.85)  # a key or two: nothing else is meant
+    slips = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.85)  # a typing error
     close = slips or difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
-    if not close and len(possible) > _MOST_TOLD:
+    if not close and len(possible) > _MOST_NAMES:
         head = f"{name.partition('.')[0]}."
         possible = [n for n in possible if n.startswith(head)] or _by_heads(possible)
     return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
 
 
 def _by_heads(names: list[str]) -> list[str]:
-    """Names in order, those that begin alike as one: ``gps.*``."""
+    """Names in order, those with the same first part as one: ``gps.*``."""
     return list(dict.fromkeys(f"{head}.*" if dot else head for head, dot, _ in (n.partition(".") for n in names)))
 
 
 def dotted_fields(params: Any) -> list[str]:
-    """Names of the fields of a parameter dataclass, nested ones with dots; parts that are not fitted have none."""
+    """Field names of a parameter dataclass, nested ones with dots; parts not fitted are left out."""
     names: list[str] = []
     for f in fields(params):
         value = getattr(params, f.name)
@@ -80,12 +80,11 @@ def dotted_fields(params: Any) -> list[str]:
 
 
 def changed(params: T, changes: Mapping[str, Any], what: str) -> T:
-    """A copy of the frozen dataclass `params` with fields changed by their dotted names.
+    """A copy of the frozen dataclass `params` with fields changed by dotted names.
 
     Raises
     ------
-    ValueError      an unknown field of `what` (with the near misses), a part that is not fitted, or a value that
-                    the dataclass refuses
+    ValueError      unknown field of `what` (with suggestions), part not fitted, or invalid value
     """
     for name, value in changes.items():
         known = dotted_fields(params)
@@ -97,14 +96,14 @@ def changed(params: T, changes: Mapping[str, Any], what: str) -> T:
 
 
 def require_fitted(params: Any, name: str, what: str) -> None:
-    """Refuse the dotted `name` of a field of a part that `what` has not: ValueError."""
+    """Reject the dotted `name` of a field of a part that is not fitted in `what`: ValueError."""
     head = name.partition(".")[0]
     if _is_part(type(params), head) and getattr(params, head) is None:
-        raise ValueError(f"parameter {name!r} of {what}: no {head} fitted; choose sensors that have one")
+        raise ValueError(f"parameter {name!r} of {what}: no {head} fitted; choose a suite that has one")
 
 
 def _is_part(owner: type, name: str) -> bool:
-    """Whether the field is a nested dataclass, or None where there is no such part."""
+    """Whether the field is a nested dataclass, or None if that part is not fitted."""
     hint = get_type_hints(owner).get(name)
     return any(is_dataclass(choice) for choice in (hint, *get_args(hint)))
 
@@ -121,16 +120,16 @@ def _change(params: Any, rest: str, value: Any, name: str, what: str) -> Any:
 
 
 def shown(name: str, value: Any) -> str:
-    """A field with its value and unit, as messages name it."""
+    """A field with its value and unit, as in messages."""
     return f"{name} = {brief(value)} {unit_of(name)}".rstrip()
 
 
 def typed(value: Any, hint: Any) -> Any:
-    """`value` as the type that a dataclass declares: a number is a float, three numbers are a tuple.
+    """`value` converted to the type declared by a dataclass: numbers to float, lists of numbers to tuple.
 
     Raises
     ------
-    ValueError      what it must be
+    ValueError      what the value must be
     """
     origin = get_origin(hint)
     if origin in (Union, UnionType):
@@ -153,7 +152,7 @@ def typed(value: Any, hint: Any) -> Any:
 
 
 def _one_of(value: Any, choices: tuple[Any, ...]) -> Any:
-    """`value` as the first of the types that it can be."""
+    """`value` as the first type that fits."""
     if value is None and type(None) in choices:
         return None
     refusals = []

@@ -1,4 +1,4 @@
-"""The seam between the loop and what flies: the Plant protocol, and how a flight starts."""
+"""The Plant protocol, the interface between the loop and what flies, and the starts of a flight."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,14 +8,14 @@ from sim.log import Log, Outcome
 
 
 class SimulationDiverged(RuntimeError):
-    """The simulation blew up: a state is not finite or far outside anything that flies."""
+    """The simulation diverged: a state is not finite or far beyond the flight envelope."""
 
 
 @dataclass(frozen=True, slots=True)
 class InFlight:
-    """Start in the air in trimmed level flight, heading as given.
+    """Start in the air in trimmed level flight at the given heading.
 
-    north_m, east_m, height_m : where, from the launch point    airspeed_m_s : None is the aeroplane's cruise
+    north_m, east_m, height_m : from the launch point    airspeed_m_s : None: the aeroplane's cruise speed
     """
 
     heading_rad: float
@@ -27,12 +27,12 @@ class InFlight:
 
 @dataclass(frozen=True, slots=True)
 class HandThrow:
-    """Start in a hand at the launch point, moved a little, then pushed along the body axis and let go.
+    """Start in a swaying hand at the launch point, pushed along the body x axis and released.
 
     heading_rad, pitch_rad : attitude of the throw          height_m : of the hand
-    hold_s : time in the hand since power-up                push_m_s2, push_s : acceleration and length of the push
-    sway_rad_s, sway_hz, sway_phase_rad : (3,) roll, pitch and yaw of the hand, a_i sin(2 pi f_i t + phase_i) in rate
-    release_rate_b_rad_s : (3,) body rates that the hand imparts by the end of the push
+    hold_s : time in the hand since power-up                push_m_s2, push_s : acceleration and duration of the push
+    sway_rad_s, sway_hz, sway_phase_rad : (3,) roll, pitch and yaw rates of the hand, a_i sin(2 pi f_i t + phase_i)
+    release_rate_b_rad_s : (3,) body rates at the end of the push
     """
 
     heading_rad: float
@@ -51,15 +51,15 @@ Start = InFlight | HandThrow
 
 
 class Plant(Protocol):
-    """What flies.  A plant owns the truth rows: `advance` fills row k, nothing else writes motion there."""
+    """What flies.  A plant owns the motion in the truth rows: only `advance` writes it, row by row."""
 
     dt_s: float  # length of a tick
-    release_s: float  # judged times count from here: time of the release; 0 where it starts in the air
+    release_s: float  # time of the release, from which judged times count; 0 for a start in the air
 
     def reset(self, log: Log) -> None:
-        """Put the aeroplane at its start; the rows of `log` are filled from tick 0 on."""
+        """Put the aeroplane at its start; the rows of `log` are filled from tick 0."""
         ...
 
     def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
-        """Fly tick `k` under `command` (actuators, physics, truth row k); an Outcome where the flight ended in it."""
+        """Fly tick `k` with `command` (actuators, physics, truth row k); an Outcome if the flight ended in it."""
         ...

@@ -1,6 +1,6 @@
-"""What the sensors said before the flight: as the aeroplane lay level on the ground, and turned on a table.
+"""Sensor data from before the flight: at rest, level on the ground, and on a calibration turn-table.
 
-Offsets, gains, irons and mounting are those of the flight, for they come from its streams.
+Biases, gains, iron and mounting are those of the flight, drawn from its random streams.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ from sim.sensors.suite import Suite
 
 
 def sample_at_rest(params: SuiteParams, rates: Rates, seed: int, flight: int = 0) -> ImuSample | None:
-    """Mean inertial sample of the very sensors of a flight over ``board.rest_s``; None where that is 0."""
+    """Mean inertial sample of the sensors of a flight over ``board.rest_s``; None if that is 0."""
     if rates.ticks(params.board.rest_s) == 0:
         return None
     return mean_sample(_measured(Rest(), params.board.rest_s, params, rates, seed, flight))
@@ -28,9 +28,9 @@ def sample_at_rest(params: SuiteParams, rates: Rates, seed: int, flight: int = 0
 def field_on_turn_table(
     params: SuiteParams, rates: Rates, seed: int, flight: int = 0, *, declination_rad: float = 0.0
 ) -> Array:
-    """Readings of the very magnetometer of a flight on the calibration turn-table, shape (n, 3), microtesla.
+    """Readings of the magnetometer of a flight on the calibration turn-table, shape (n, 3), microtesla.
 
-    The motor stands: what its current adds in flight is not in them.
+    The motor is off: its field in flight is not included.
     """
     table = TurnTable(declination_rad)
     rows = _measured(table, table.duration_s, params, rates, seed, flight)
@@ -40,6 +40,6 @@ def field_on_turn_table(
 def _measured(
     motion: Motion, duration_s: float, params: SuiteParams, rates: Rates, seed: int, flight: int
 ) -> NDArray[Any]:
-    """Measured rows of the sensors of a flight on `motion`."""
+    """Measured rows of `motion` by the sensors of a flight."""
     plant, suite = PrescribedPlant(motion, rates), Suite(params, rates, seed, flight)
     return sense(plant, suite, Log.empty(rates.ticks(duration_s))).measured

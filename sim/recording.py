@@ -1,12 +1,12 @@
-"""A flight on disk: every tick of every column in Parquet, and beside it what is needed to fly it again.
+"""A flight on disk: every tick of every column in Parquet, and the data needed to fly it again.
 
-``flight.parquet``   one row per tick.  A column is named table, quantity and element: ``truth.R_eb.zx``,
-                     ``measured.gyro_b_rad_s.x``, ``flown.wind_e_m_s.n``; its Arrow field says what it means.
-                     Its schema carries the same record as the manifest, so that the file stands alone.
-``manifest.json``    seed, resolved configuration, versions, outcome and events, for people and scripts; the
-                     SHA-256 of the Parquet file vouches for the pair.
+``flight.parquet``   one row per tick.  Columns are named by table, quantity and element: ``truth.R_eb.zx``,
+                     ``measured.gyro_b_rad_s.x``, ``flown.wind_e_m_s.n``; the Arrow field holds the meaning.
+                     The schema includes the record of the manifest, so that the file is self-contained.
+``manifest.json``    seed, resolved configuration, versions, outcome and events, for people and scripts, and the
+                     SHA-256 of the Parquet file.
 
-A file appears under its name complete or not at all: it is written beside it and renamed.
+Files appear complete or not at all: they are written under a temporary name and renamed.
 """
 
 import hashlib
@@ -34,7 +34,7 @@ from sim.outside import drafts, files
 
 PARQUET = "flight.parquet"
 MANIFEST = "manifest.json"
-FORMAT = 1  # raised when the columns or the record change in a way that an older reader would misread
+FORMAT = 1  # increased when an older reader would misread the columns or the record
 LARGEST_MANIFEST = 64 << 20  # bytes
 _KEY = b"wingslevel"
 _OWN = ("format", "outcome", "message", "heading_reference", "dt_s", "release_s", "n_ticks", "events", "sha256")
@@ -54,7 +54,7 @@ class Element(NamedTuple):
 
 
 def elements() -> tuple[Element, ...]:
-    """Every Parquet column in file order, made from the column tables of the log.
+    """Every Parquet column in file order, from the column tables of the log.
 
     A matrix is named by the paper's row and column letters, a vector in the earth frame by n, e, d, one in the
     body frame by x, y, z.
@@ -70,7 +70,7 @@ def elements() -> tuple[Element, ...]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that decide what a flight looks like; goes into the manifest."""
+    """Versions of Python and of the packages that determine a flight, for the manifest."""
     found = {"python": platform.python_version()}
     for package in ("jsbsim", "numpy", "numba", "wingslevel"):
         try:
@@ -81,7 +81,7 @@ def versions() -> dict[str, str]:
 
 
 def digest(flight: Flight) -> str:
-    """SHA-256 over the name and the bytes of every column, hexadecimal: equal for bit-equal logs alone."""
+    """SHA-256 over name and bytes of every column, hexadecimal: equal only for bit-equal logs."""
     sha = hashlib.sha256()
     for name, values in _columns(flight.log):
         sha.update(f"{name}:{values.dtype.str}:{len(values)};".encode())
@@ -90,7 +90,7 @@ def digest(flight: Flight) -> str:
 
 
 def check_writable(directory: str | Path) -> None:
-    """Refuse, before flying, a directory in which a recording could not be written; leaves no trace.
+    """Check before flying that a recording can be written to a directory; leaves no trace.
 
     Raises
     ------
@@ -106,11 +106,11 @@ def check_writable(directory: str | Path) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary name beside `path` to write to; rename it to `path` at the end, remove it on any exception.
 
-    Removes, before, what killed processes have left half written beside `path`.
+    First removes incomplete files that killed processes left beside `path`.
 
     Raises
     ------
-    RecordingError    where the system refuses to write
+    RecordingError    the file cannot be written
     """
     temporary = drafts.hidden(path)
     try:
@@ -121,18 +121,18 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise _unwritable(path, error) from error
     finally:
-        # Also on Ctrl-C; where the rename was done there is nothing left to remove.
+        # Also on Ctrl-C; nothing to remove after the rename.
         with suppress(OSError):
             temporary.unlink()
 
 
 @contextmanager
 def new_folder(into: Path, name: str) -> Iterator[drafts.Draft]:
-    """Give a new folder for a recording, which appears in `into` when the block is done: see `drafts.new_folder`.
+    """Give a new folder for a recording, which appears in `into` when the block ends: see `drafts.new_folder`.
 
     Raises
     ------
-    RecordingError    where the system refuses to write
+    RecordingError    the folder cannot be written
     """
     try:
         with drafts.new_folder(into, name) as draft:
@@ -145,11 +145,11 @@ def new_folder(into: Path, name: str) -> Iterator[drafts.Draft]:
 
 
 def save(flight: Flight, directory: str | Path) -> Path:
-    """Write `flight` into `directory`, made where it is missing, and return that directory.
+    """Write `flight` into `directory`, created if missing, and return that directory.
 
     Raises
     ------
-    RecordingError    where the system refuses to write, or the manifest uses a name that the recording owns
+    RecordingError    the files cannot be written, or the manifest uses a reserved name
     """
     directory = Path(directory)
     record = _record(flight)
@@ -157,7 +157,7 @@ def save(flight: Flight, directory: str | Path) -> Path:
     with replacing(directory / PARQUET) as path:
         _write_parquet(_table(flight.log, record), path)
         record["sha256"] = _sha256(path)
-        manifest.unlink(missing_ok=True)  # never an old manifest beside a new flight, whenever we are interrupted
+        manifest.unlink(missing_ok=True)  # no old manifest beside a new flight, even if interrupted
     with replacing(manifest) as path:
         path.write_text(json.dumps(record, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return directory
@@ -172,17 +172,17 @@ def _write_parquet(table: pa.Table, path: Path) -> None:
             use_dictionary=[e.name for e in elements() if e.column.integer],
             use_byte_stream_split=[e.name for e in elements() if not e.column.integer],  # halves noisy floats
         )
-    except pa.ArrowException as error:  # what the system refuses is an OSError already
+    except pa.ArrowException as error:  # system errors are already OSError
         raise RecordingError(f"cannot write to {path}: {_first_line(error)}") from error
 
 
 def load(source: str | Path) -> Flight:
-    """The flight that `save` wrote, bit for bit, from its directory or its Parquet file.
+    """The flight written by `save`, bit for bit, from its directory or its Parquet file.
 
     Raises
     ------
-    RecordingError    no recording there, a truncated or foreign file, other columns than this version's, or a
-                      file that its manifest does not vouch for
+    RecordingError    no recording there, a truncated or foreign file, columns of another version, or a checksum
+                      that differs from the manifest
     """
     path = Path(source)
     if path.is_dir():
@@ -202,7 +202,7 @@ def _load(path: Path) -> Flight:
         _check_sha256(path)
         log = _log_of(file, path)
     if record["n_ticks"] != len(log):
-        raise RecordingError(f"{path}: {len(log)} rows, but its record says {record['n_ticks']} ticks")
+        raise RecordingError(f"{path}: {len(log)} rows, but {record['n_ticks']} ticks according to its record")
     return Flight(
         log=log,
         dt_s=record["dt_s"],
@@ -216,8 +216,8 @@ def _load(path: Path) -> Flight:
 
 
 def plain(value: Any) -> Any:
-    """`value` as JSON knows it: dataclasses and mappings as dicts, NumPy as numbers, NaN and infinity as None."""
-    if isinstance(value, Enum):  # before numbers and strings, which an enumeration may also be
+    """`value` as JSON types: dataclasses and mappings as dicts, NumPy as numbers, NaN and infinity as None."""
+    if isinstance(value, Enum):  # first: an enumeration may also be a number or string
         return value.value if isinstance(value, str) else value.name.lower()
     if value is None or isinstance(value, bool | int | str):
         return value
@@ -251,29 +251,24 @@ def _table(log: Log, record: dict[str, Any]) -> pa.Table:
 def _record(flight: Flight) -> dict[str, Any]:
     taken = sorted(set(_OWN) & set(flight.manifest))
     if taken:
-        raise RecordingError(f"the manifest may not hold {', '.join(taken)}: the recording writes that itself")
+        raise RecordingError(f"the manifest uses the reserved name {', '.join(taken)}: choose another")
     own = {
-        "format": FORMAT,
-        "outcome": flight.outcome,
-        "message": flight.message,
-        "heading_reference": flight.heading_reference,
-        "dt_s": flight.dt_s,
-        "release_s": flight.release_s,
-        "n_ticks": len(flight.log),
-        "events": flight.events,
-    }
+        "format": FORMAT, "outcome": flight.outcome, "message": flight.message,
+        "heading_reference": flight.heading_reference, "dt_s": flight.dt_s, "release_s": flight.release_s,
+        "n_ticks": len(flight.log), "events": flight.events,
+    }  # fmt: skip
     return plain({"versions": versions(), **flight.manifest, **own})
 
 
 def _record_of(schema: pa.Schema, path: Path) -> dict[str, Any]:
     stored = (schema.metadata or {}).get(_KEY)
     if stored is None:
-        raise RecordingError(f"{path} is a Parquet file, but not a flight: it carries no record of wingslevel")
+        raise RecordingError(f"{path} is a Parquet file, but not a flight: it has no wingslevel record")
     return recording_checks.record(json.loads(stored), (FORMAT,))
 
 
 def _log_of(file: pq.ParquetFile, path: Path) -> Log:
-    """The columns of the file, each of which is checked; those of the time first, as they are told first."""
+    """The columns of the file, each checked; times first, so that their errors are reported first."""
     expected, found, rows = [e.name for e in elements()], file.schema_arrow.names, file.metadata.num_rows
     if odd := sorted(set(expected) ^ set(found)):
         kind = "lacks" if odd[0] in expected else "has the unknown"
@@ -299,7 +294,7 @@ def _check_sha256(path: Path) -> None:
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise RecordingError(f"cannot read {manifest}: not a manifest of a flight ({_first_line(error)})") from error
     if promised != _sha256(path):
-        raise RecordingError(f"{path} is not the file that {MANIFEST} beside it describes: its SHA-256 differs")
+        raise RecordingError(f"{path} does not match the {MANIFEST} beside it: its SHA-256 differs")
 
 
 def _sha256(path: Path) -> str:
@@ -309,7 +304,7 @@ def _sha256(path: Path) -> str:
 
 def _unwritable(path: Path, error: OSError) -> RecordingError:
     said = error.strerror or _first_line(error)
-    if error.errno and "[errno" in said:  # Arrow's long way to say it
+    if error.errno and "[errno" in said:  # shorten Arrow's message
         said = os.strerror(error.errno)
     return RecordingError(f"cannot write to {path}: {said}")
 

@@ -1,7 +1,7 @@
-"""What a recording must hold before anybody computes with it: the types of its record, and sane columns.
+"""Checks of a recording before use: the types of its record and the values of its columns.
 
-A recording may come from anywhere, and a file may have been altered since.  Each function raises ValueError with what
-is wrong and where; `sim.recording.load` adds the path.
+A recording may come from anywhere and may have been edited.  Each function raises ValueError with the error and its
+place; `sim.recording.load` adds the path.
 """
 
 import math
@@ -16,13 +16,13 @@ from autopilot.interface import Mode
 from estimator.instruments import PROPERTIES, property_value
 from estimator.interface import Health
 from sim.log import Outcome, Phase
-from sim.outside.wording import printable
+from sim.outside.wording import brief, printable
 
-LONGEST_TICK_S, LATEST_S = 10.0, 1e11  # of a tick; a time beyond is none, with 15 digits not even to the tick
+LONGEST_TICK_S, LATEST_S = 10.0, 1e11  # of a tick; beyond this, 15 digits do not resolve a tick
 MOST_BYTES = 4 << 30  # of all columns in memory
 _LEVELS = ("info", "warn", "error")
 _SOURCES = ("set", "data sheet", "log", "learnt", "assumed", "withheld", "unknown")
-_CHOICES = {  # integer columns -> what they may hold
+_CHOICES = {  # integer columns -> valid values
     "truth.phase": tuple(Phase), "flown.health": tuple(Health), "flown.mode": tuple(Mode),
     **dict.fromkeys(("measured.gps_new", "measured.gps_valid", "measured.mag_new", "measured.air_new"), (0, 1)),
 }  # fmt: skip
@@ -30,12 +30,12 @@ _TIMES = ("truth.t_s", "measured.t_s")
 
 
 def record(data: Any, formats: tuple[int, ...]) -> dict[str, Any]:
-    """The record of a flight, as the manifest holds it, where everything that is used of it has the right type."""
+    """The record of a flight as in the manifest, after checking the type of everything used."""
     if not isinstance(data, dict):
         raise _wrong("the record", data, "a table")
     if data.get("format") not in formats or isinstance(data["format"], bool | float):
         wanted = " or ".join(map(str, formats))
-        raise ValueError(f"recording format {_shown(data.get('format'))}; this version reads {wanted}")
+        raise ValueError(f"recording format {brief(data.get('format'))}; this version reads {wanted}")
     _own(data)
     tables = ("config", "known", "known_to_estimator", "on_ground", "ledger", "versions", "scores")
     for name in tables:
@@ -55,16 +55,15 @@ def record(data: Any, formats: tuple[int, ...]) -> dict[str, Any]:
 
 
 def _own(data: Mapping[str, Any]) -> None:
-    """What the recording itself writes."""
+    """Check the entries written by the recording itself."""
     for name in ("outcome", "message", "heading_reference", "dt_s", "release_s", "n_ticks", "events"):
         if name not in data:
-            raise ValueError(f"its record has no {name}")
+            raise ValueError(f"its record lacks {name}")
     _choice("outcome", data["outcome"], tuple(Outcome))
     _choice("heading_reference", data["heading_reference"], ("course", "nose"))
     _text("message", data["message"])
-    _number(
-        "dt_s", data["dt_s"], lambda v: 0.0 < v <= LONGEST_TICK_S, f"the length of a tick, 0 to {LONGEST_TICK_S:g} s"
-    )
+    tick = f"the length of a tick, 0 to {LONGEST_TICK_S:g} s"
+    _number("dt_s", data["dt_s"], lambda v: 0.0 < v <= LONGEST_TICK_S, tick)
     _number("release_s", data["release_s"], lambda v: abs(v) < LATEST_S, "a time in seconds")
     n = data["n_ticks"]
     if not isinstance(n, int) or isinstance(n, bool) or n < 0:
@@ -78,7 +77,7 @@ def _own(data: Mapping[str, Any]) -> None:
 
 
 def _settings(where: str, table: Mapping[str, Any]) -> None:
-    """Entries of the manifest or of its configuration that somebody reads; any may be missing."""
+    """Check the entries of the manifest or its configuration that are used; any may be missing."""
     for name in ("scenario", "aircraft", "estimator", "autopilot", "suite", "reference"):
         if table.get(name) is not None:
             _text(f"{where}{name}", table[name])
@@ -102,7 +101,7 @@ def _settings(where: str, table: Mapping[str, Any]) -> None:
 
 
 def _known(where: str, name: str, entry: Any) -> None:
-    """What is known of an instrument, as `estimator.instruments.Known` writes it."""
+    """Check one known property of an instrument, as written by `estimator.instruments.Known`."""
     if not isinstance(entry, dict) or "value" not in entry:
         raise _wrong(where, entry, "a table of value and source")
     _choice(f"{where}.source", entry.get("source"), _SOURCES)
@@ -132,7 +131,7 @@ def _on_ground(sample: Mapping[str, Any]) -> None:
 
 
 def schema(found: pa.Schema, expected: Mapping[str, bool], rows: int) -> None:
-    """Refuse columns of another type, and more rows than can be held.
+    """Reject columns of another type and too many rows: ValueError.
 
     expected : name of a column -> whether it holds whole numbers
     """
@@ -148,7 +147,7 @@ def schema(found: pa.Schema, expected: Mapping[str, bool], rows: int) -> None:
 
 
 def column(name: str, values: pa.ChunkedArray, rows: int) -> NDArray[Any]:
-    """The numbers of a column; ValueError, with the row, for one that cannot be worked with."""
+    """The numbers of a column; ValueError, with the row, for an invalid one."""
     if len(values) != rows:
         raise ValueError(f"column {name} has {len(values)} rows, the file {rows}")
     if values.null_count:
@@ -169,7 +168,7 @@ def _check_times(name: str, t_s: NDArray[Any]) -> None:
     wrong = ~(np.abs(t_s) < LATEST_S)
     if wrong.any():
         first = int(np.argmax(wrong))
-        raise ValueError(f"column {name}, row {first + 1}: {t_s[first]:g} s is no time")
+        raise ValueError(f"column {name}, row {first + 1}: {t_s[first]:g} s is not a valid time")
     late = np.diff(t_s) <= 0.0
     if late.any():
         first = int(np.argmax(late)) + 1
@@ -186,7 +185,7 @@ def _number(where: str, value: Any, right: Callable[[float], bool], wanted: str)
 def _holds(right: Callable[[float], bool], value: float) -> bool:
     try:
         return math.isfinite(value) and right(float(value))
-    except OverflowError:  # a whole number beyond all others
+    except OverflowError:  # an integer too large for a float
         return False
 
 
@@ -207,11 +206,4 @@ def _list(where: str, value: Any) -> list[Any]:
 
 
 def _wrong(where: str, value: Any, wanted: str) -> ValueError:
-    return ValueError(f"its record has {printable(where, 60)} = {_shown(value)}: must be {wanted}")
-
-
-def _shown(value: Any) -> str:
-    try:
-        return printable(repr(value), 60)
-    except (RecursionError, ValueError):  # nested too deeply; too many digits
-        return f"a {type(value).__name__}"
+    return ValueError(f"its record has {printable(where, 60)} = {brief(value)}: must be {wanted}")

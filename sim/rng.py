@@ -8,7 +8,7 @@ import numpy as np
 def stream(seed: int, flight: int, name: str) -> np.random.Generator:
     """Generator of the source `name` in flight number `flight` of the campaign `seed`.
 
-    Flight k alone draws what flight k of a campaign draws, on any number of workers; adding a source changes
-    no other (NumPy, SeedSequence and its spawn_key).
+    Flight k alone draws the same as flight k of a campaign, on any number of workers; adding a source changes no
+    other source (NumPy, SeedSequence and its spawn_key).
     """
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(flight, crc32(name.encode())))))

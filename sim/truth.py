@@ -1,44 +1,15 @@
-"""The truth: one tick of it as an object, and what a perfect inertial unit would make of it."""
-
-from dataclasses import dataclass
+"""The earth's rotation and gravity, and the means over a tick that a perfect inertial unit measures."""
 
 import numpy as np
 
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
-from sim.log import Log
 
 EARTH_RATE_RAD_S = 7.292115e-5  # WGS 84
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """What is really so at one tick; views of the row, not to be edited.
-
-    R_eb : (3, 3)   omega_b_rad_s, p_e_m, v_e_m_s, wind_e_m_s, gyro_bias_b_rad_s : (3,)   t_s, airspeed_m_s : float
-    """
-
-    t_s: float
-    R_eb: Array
-    omega_b_rad_s: Array
-    p_e_m: Array
-    v_e_m_s: Array
-    wind_e_m_s: Array
-    airspeed_m_s: float
-    gyro_bias_b_rad_s: Array
-
-    @classmethod
-    def at(cls, log: Log, k: int) -> "Truth":
-        """Tick `k` of `log`."""
-        row = log.truth[k]
-        return cls(
-            float(row["t_s"]), row["R_eb"], row["omega_b_rad_s"], row["p_e_m"], row["v_e_m_s"],
-            row["wind_e_m_s"], float(row["airspeed_m_s"]), row["gyro_bias_b_rad_s"],
-        )  # fmt: skip
-
-
 def earth_rate_e_rad_s(latitude_rad: float) -> Array:
-    """The earth's rotation seen in the local north-east-down frame, shape (3,)."""
+    """The earth's rotation in the local north-east-down frame, shape (3,)."""
     return EARTH_RATE_RAD_S * np.array([np.cos(latitude_rad), 0.0, -np.sin(latitude_rad)])
 
 
@@ -52,9 +23,9 @@ def gravity_m_s2(latitude_rad: float) -> float:
 def integrate_imu(R0_eb, v0_e_m_s, row, dt_s, g_m_s2, earth_rate_e):  # type: ignore[no-untyped-def]
     """Fill the perfect inertial means of `row` from the motion since the previous tick.
 
-    A delta-angle, delta-velocity inertial unit: the gyro is the rotation vector of ``R0_eb.T @ R_eb`` over dt
-    plus the earth's rotation; the specific force is ``R.T (dv/dt + 2 earth x v - g)`` at the attitude half-way
-    (the half-way error is (angle per tick)^2 / 24).
+    As a delta-angle, delta-velocity inertial unit: the gyro is the rotation vector of ``R0_eb.T @ R_eb`` over dt
+    plus the earth's rotation; the specific force is ``R.T (dv/dt + 2 earth x v - g)`` at the mid-tick attitude
+    (with an error of (angle per tick)^2 / 24).
 
     R0_eb : (3, 3)   v0_e_m_s : (3,)   row : record of TRUTH with R_eb and v_e_m_s set   earth_rate_e : (3,) rad/s
     """
@@ -75,7 +46,7 @@ def integrate_imu(R0_eb, v0_e_m_s, row, dt_s, g_m_s2, earth_rate_e):  # type: ig
     fn = (v[0] - v0_e_m_s[0]) / dt_s + 2.0 * (wy * vd - wz * ve)
     fe = (v[1] - v0_e_m_s[1]) / dt_s + 2.0 * (wz * vn - wx * vd)
     fd = (v[2] - v0_e_m_s[2]) / dt_s + 2.0 * (wx * ve - wy * vn) - g_m_s2
-    # Half-way attitude: the mean of the two is short by cos(angle / 2) across the axis of rotation, exact along it.
+    # Mid-tick attitude: the mean of the two is exact along the axis of rotation, short by cos(angle / 2) across it.
     cosine = np.cos(0.5 * angle)
     nx, ny, nz = (sx / sine, sy / sine, sz / sine) if sine > 1e-9 else (0.0, 0.0, 0.0)
     f = row.imu_force_b_m_s2

@@ -1,8 +1,11 @@
-"""What all tests share: how hypothesis searches, and a Ctrl-C that arrives."""
+"""What all tests share: how hypothesis searches, a Ctrl-C that arrives, and compilers of C, C++ and Rust."""
 
 import os
+import shutil
 import signal
-from collections.abc import Iterator
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -28,3 +31,33 @@ def ctrl_c() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+_INCLUDE = str(Path(__file__).resolve().parents[1] / "wingslevel" / "include")
+_STRICT = ("-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-pedantic", "-Werror", "-shared", "-fPIC", f"-I{_INCLUDE}")
+_COMPILERS = {
+    ".c": ("cc", "-std=c99", *_STRICT),
+    ".cpp": ("c++", "-std=c++11", *_STRICT),
+    ".rs": ("rustc", "-D", "warnings", "-O", "--crate-type", "cdylib"),
+}
+
+
+@pytest.fixture
+def build(tmp_path: Path) -> Callable[..., Path]:
+    """Builds a shared library from a source file, or from text and the name of one; skips without the compiler."""
+
+    def _build(source: Path | str, name: str = "mine.c", *options: str) -> Path:
+        path = source if isinstance(source, Path) else tmp_path / name
+        command = _COMPILERS[path.suffix]
+        if shutil.which(command[0]) is None:
+            pytest.skip(f"no compiler {command[0]}")
+        if isinstance(source, str):
+            path.write_text(source, encoding="utf-8")
+        library = tmp_path / f"{path.stem}.so"
+        rest = () if path.suffix == ".rs" else ("-lm",)
+        arguments = [*command, *options, str(path), "-o", str(library), *rest]
+        done = subprocess.run(arguments, capture_output=True, text=True, check=False, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return library
+
+    return _build

@@ -9,7 +9,8 @@ Fly
 >>> flight.plot().savefig("crosswind.png")
 >>> flight.save("flights/mine")               # wl.load("flights/mine") reads it again
 
-Your own estimator is a class with a method ``update``; pass the class itself, or name it ``"file.py:Class"``:
+Your own estimator is a class with a method ``update``; pass the class itself, or name it ``"file.py:Class"``.  One in a
+shared library is named ``"mine.so"``; `get_include` is the folder of the C header.
 
 >>> flight = wl.fly("crosswind", estimator=MyFilter, params={"k_p": 0.5})
 
@@ -63,6 +64,7 @@ if TYPE_CHECKING:
     from wingslevel._pages import export, view
     from wingslevel._replaying import Replay, replay
     from wingslevel._results import CheckResult, Comparison
+    from wingslevel.include import get_include
 
     __version__: str
 
@@ -83,6 +85,7 @@ _HOMES = {
     "wingslevel._pages": ("export", "view"),
     "wingslevel._replaying": ("Replay", "replay"),
     "wingslevel._results": ("CheckResult", "Comparison"),
+    "wingslevel.include": ("get_include",),
 }  # fmt: skip
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -114,6 +117,7 @@ __all__ = [
     "estimators",
     "export",
     "fly",
+    "get_include",
     "load",
     "parameters",
     "replay",

@@ -263,8 +263,4 @@ def rows_of(recorded: Recorded) -> "tuple[Row, ...] | None":
     entries = recorded.manifest.get("verdict")
     if not entries:
         return None
-    return tuple(Row(**{**entry, "measured": _number(entry["measured"])}) for entry in entries)
-
-
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else float(value)
+    return tuple(map(Row.from_json, entries))

@@ -11,27 +11,11 @@ from scenarios.harness import metrics
 from scenarios.harness.metrics import Measured, Metric, Moment, SeriesOf, end, over, start, survived
 from sim.log import Flight
 from sim.outside.blame import Refused, home_of, shown, theirs
+from sim.rows import Row as Row
+from sim.rows import Sense as Sense
 
 Pooling = Literal["rms", "worst", "count"]
-Sense = Literal["<=", ">="]
 LOOSEST = 1.5  # a flight's own limit may be this much looser than the pooled one
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """The result of one check: one line of a verdict.
-
-    note : how many samples are missing, or what the metric raised (`raised`)
-    """
-
-    name: str
-    unit: str
-    measured: float
-    sense: Sense
-    limit: float
-    passed: bool
-    note: str = ""
-    raised: bool = False
 
 
 class _NotMeasured(RuntimeError):

@@ -16,6 +16,7 @@ from scenarios.harness.aboard import equipped_estimator, instruments_of
 from scenarios.harness.config import FlightConfig, InFlightStart, fitted_suite, overridden, resolve
 from scenarios.harness.config.faults import parse_fault
 from scenarios.harness.config.plant import build_plant
+from scenarios.harness.own_files import library_named
 from scenarios.harness.plugins import (
     Equipped,
     Maker,
@@ -67,11 +68,13 @@ class Prepared:
     @property
     def manifest(self) -> dict[str, Any]:
         """What goes into the recording, and from which the same flight can be prepared again."""
+        library = library_named(self.config.estimator)
         return {
             "scenario": self.scenario.name,
             "seed": self.config.seed,
             "config": self.config.model_dump(mode="json"),
             "known": to_json(self.instruments),
+            **({"estimator_sha256": library.sha256} if library else {}),
         }
 
     def fly(self, watch: Watch | None = None) -> Flight:

@@ -14,11 +14,39 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 from sim.outside.blame import Refused, theirs
 
+PREFIX = "wingslevel"
+LIBRARIES = (".so", ".dylib", ".dll")
 _run: dict[str, ModuleType] = {}  # modules that were made here, by name
 _running: set[Path] = set()  # files whose code is being run
+
+
+class Library(NamedTuple):
+    """A shared library: its file, and what the names of its five functions begin with."""
+
+    path: Path
+    prefix: str = PREFIX
+
+    @property
+    def short_name(self) -> str:
+        """What its parameters may be set by: that of the file without its ending, or the prefix."""
+        return self.path.name.partition(".")[0] if self.prefix == PREFIX else self.prefix
+
+    @property
+    def sha256(self) -> str:
+        """Of the bytes of the file, hexadecimal."""
+        return hashlib.sha256(self.path.read_bytes()).hexdigest()
+
+
+def library_named(spec: str) -> Library | None:
+    """The library that ``mine.so`` or ``mine.so:prefix`` names; None for the name of anything else."""
+    if spec.endswith(LIBRARIES):
+        return Library(Path(spec))
+    file, colon, prefix = spec.rpartition(":")
+    return Library(Path(file), prefix) if colon and file.endswith(LIBRARIES) else None
 
 
 def module_of_file(path: Path, refuse: Callable[[str], Exception]) -> ModuleType:

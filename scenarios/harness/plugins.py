@@ -6,6 +6,7 @@ A name is one of
                       ``wingslevel.estimators`` or ``wingslevel.autopilots``
 ``package.module:Class``   anything that can be imported, also from the working directory
 ``path/to/file.py:Class``  a file
+``path/to/library.so``     a shared library, see `scenarios.harness.c_library`: estimators only
 
 The class is called anew for each flight.  Its constructor is given what it asks for by name: ``instruments``, the
 record of what is known of those aboard, or single properties of it, such as ``gps_latency_s``; an autopilot's also
@@ -28,7 +29,7 @@ from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
 from estimator.instruments import Instruments, Known, property_value
 from scenarios.harness import lent
-from scenarios.harness.own_files import also_import_from, module_of_file
+from scenarios.harness.own_files import also_import_from, library_named, module_of_file
 from sim.outside.blame import Refused, home_of, place_of, shown, theirs
 from sim.outside.entry_points import Offer, offered
 from sim.outside.wording import class_name, described, printable
@@ -156,7 +157,7 @@ def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[s
     ------
     ValueError      one line: a parameter that none of them has
     """
-    short = {spec: spec.rpartition(":")[2] for spec in specs}
+    short = {spec: short_name(spec) for spec in specs}
     of_each: dict[str, dict[str, Any]] = {spec: {} for spec in specs}
     has = {spec: parameters_of(spec) for spec in specs} if settings else {}
     own = {key: key.partition(".") for key in settings if key.partition(".")[0] in short.values() and "." in key}
@@ -174,6 +175,15 @@ def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[s
     for key, (head, _, rest) in own.items():  # after those for all: what is set for one estimator wins
         of_each[next(spec for spec in specs if short[spec] == head)][rest] = settings[key]
     return of_each
+
+
+def short_name(spec: "str | Maker") -> str:
+    """What reports call an estimator: the name of its class, or of its library."""
+    library = library_named(spec) if isinstance(spec, str) else None
+    if library is not None:
+        return library.short_name
+    name, parenthesis, settings = maker_name(spec).partition("(")
+    return f"{name.rpartition(':')[2]}{parenthesis}{settings}"
 
 
 def without(of_each: Mapping[str, Mapping[str, Any]], settings: Mapping[str, Any]) -> list[str]:
@@ -283,12 +293,6 @@ def maker_name(spec: "str | Maker") -> str:
         return printable(f"{spec.__module__}:{name}")
     except BaseException:  # anyone's class
         return class_name(spec)
-
-
-def short_name(spec: "str | Maker") -> str:
-    """`maker_name` without the module or file."""
-    name, parenthesis, settings = maker_name(spec).partition("(")
-    return f"{name.rpartition(':')[2]}{parenthesis}{settings}"
 
 
 def _check_reference(spec: "str | Maker", estimator: object) -> None:
@@ -419,6 +423,12 @@ def _find(kind: _Kind, spec: str) -> Any:
         with _refusing(kind, spec):
             return lent.find(spec)
     named = spec
+    library = library_named(spec) if kind is _ESTIMATOR else None
+    if library is not None:
+        from scenarios.harness.c_library import class_of_library  # loads the machinery that only these need
+
+        with _refusing(kind, spec):
+            return class_of_library(library)
     if spec in kind.registry:
         spec = kind.registry[spec]
     elif ":" not in spec:

@@ -12,6 +12,7 @@ from scenarios.harness.metrics import summary
 from scenarios.harness.scenario import Scenario
 from sim.log import Flight, Outcome
 from sim.outside.wording import json_text, markdown
+from sim.rows import markdown_table
 
 PASSED, FAILED, SIMULATION_FAILED = 0, 1, 3  # exit codes; 2 is for usage and configuration
 # Outcomes that are no result of flying: what was to be judged is not there, or only half of it.
@@ -161,7 +162,7 @@ class Verdict:
                 {
                     "scenario": v.scenario, "estimator": v.estimator, "seed": v.seed, "flight": v.flight,
                     "outcome": str(v.outcome), "message": v.message, "passed": v.passed,
-                    "checks": [plain(row) for row in v.rows], "metrics": dict(v.metrics),
+                    "checks": [row.to_json() for row in v.rows], "metrics": dict(v.metrics),
                     "known": to_json(v.known),
                 }
                 for v in self.flights
@@ -169,7 +170,7 @@ class Verdict:
             "pooled": [
                 {
                     "scenario": v.scenario, "estimator": v.estimator, "n_flights": v.n_flights,
-                    "passed": v.passed, "checks": [plain(row) for row in v.rows],
+                    "passed": v.passed, "checks": [row.to_json() for row in v.rows],
                 }
                 for v in self.pooled
             ],
@@ -196,12 +197,12 @@ class Verdict:
             lines = ["# Verdict: INCOMPLETE", "", f"Interrupted: {self.missing_text}.", ""]
         for pool in self.pooled:
             title = f"{markdown(pool.scenario)}, {markdown(pool.estimator)}, {counted(pool.n_flights)}"
-            lines += [f"## {title}", "", *_table(pool.rows), ""]
+            lines += [f"## {title}", "", *markdown_table(pool.rows), ""]
             for v in self.flights_of(pool):
                 if not v.passed:
                     ended = f"{v.outcome}: {v.message}" if v.message else str(v.outcome)
                     lines += [f"### seed {v.seed} flight {v.flight}: {markdown(ended)}", ""]
-                    lines += [*_table(v.rows), ""] if v.rows else []
+                    lines += [*markdown_table(v.rows), ""] if v.rows else []
         return "\n".join(lines)
 
 
@@ -224,31 +225,3 @@ def _pool(scenario: Scenario, estimator: str, flights: Sequence[FlightVerdict]) 
 def counted(n: int) -> str:
     """So many flights, in words."""
     return f"{n} flight" if n == 1 else f"{n} flights"
-
-
-def plain(row: Row) -> dict[str, Any]:
-    """A line as plain data for JSON; what could not be measured is None."""
-    measured = row.measured if math.isfinite(row.measured) else None
-    plain = {"name": row.name, "unit": row.unit, "measured": measured, "sense": row.sense, "limit": row.limit,
-             "passed": row.passed}  # fmt: skip
-    return plain | ({"note": row.note} if row.note else {})
-
-
-def measured_text(row: Row) -> str:
-    """The measured value as people read it, with its unit and what is missing."""
-    value = f"{row.measured:.4g} {row.unit}".strip() if math.isfinite(row.measured) else "not measured"
-    return f"{value} ({row.note})" if row.note else value
-
-
-def limit_text(row: Row) -> str:
-    """The limit as people read it."""
-    return f"{row.sense} {row.limit:.4g} {row.unit}".strip()
-
-
-def _table(rows: Sequence[Row]) -> list[str]:
-    lines = ["| check | measured | limit | verdict |", "|-|-|-|-|"]
-    for row in rows:
-        safe = replace(row, name=markdown(row.name), unit=markdown(row.unit), note=markdown(row.note))
-        word = "pass" if row.passed else "**FAIL**"
-        lines.append(f"| {safe.name} | {measured_text(safe)} | {limit_text(safe)} | {word} |")
-    return lines

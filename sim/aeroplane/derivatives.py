@@ -1,6 +1,6 @@
-"""Stability derivatives out of a linear model, and the textbook's formulas for the modes made of them.
+"""Stability derivatives of a linear model, and textbook approximations of the modes.
 
-Stability axes: the body axes turned about y until x points along the trimmed flight, so that w is zero there.
+Stability axes: the body axes rotated about y so that x points along the trimmed flight and w is zero.
 
 References
 ----------
@@ -29,7 +29,7 @@ U, V, W, P, Q, R, ROLL, PITCH = range(8)
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """What turns forces into coefficients: the aeroplane, and its air, lift and drag at a trim."""
+    """Quantities that convert forces to coefficients: aeroplane, air, lift and drag at a trim."""
 
     mass_kg: float
     inertia_kg_m2: Array  # (3, 3), about the centre of gravity, body axes
@@ -38,12 +38,12 @@ class Airframe:
     chord_m: float
     density_kg_m3: float
     airspeed_m_s: float
-    lift_n: float  # with the thrust's part across the path
+    lift_n: float  # including the thrust component across the path
     drag_n: float
 
     @classmethod
     def of(cls, model: "Model", linear: LinearModel) -> "Airframe":
-        """Of `model`, put into the trim of `linear`; the thrust acts along the body's x axis."""
+        """Of `model` at the trim of `linear`; the thrust acts along the body x axis."""
         t, x = linear.trim, linear.x
         derivative(model, x, linear.u)
         weight_n = model.mass_kg() * G_M_S2
@@ -62,7 +62,7 @@ class Airframe:
 def stability_axes(linear: LinearModel) -> Array:
     """A of u v w p q r roll pitch, shape (8, 8), with velocities and rates in stability axes.
 
-    The Euler angles stay those of the body.
+    The Euler angles remain those of the body.
     """
     c, s = math.cos(linear.trim.alpha_rad), math.sin(linear.trim.alpha_rad)
     R_sb = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
@@ -74,8 +74,8 @@ def stability_axes(linear: LinearModel) -> Array:
 def coefficients(linear: LinearModel, frame: Airframe) -> dict[str, float]:
     """Dimensionless derivatives per radian, rates as p b / 2V and q c / 2V, controls per full deflection.
 
-    Lift and moments in stability axes, with the thrust as it goes with the state.  Lift turns with the wind, the
-    forces of the linear model do not: the drag makes up for that (Nelson, chapter 3).
+    Lift and moments in stability axes, with the thrust as a function of the state.  Lift turns with the flow, the
+    forces of the linear model do not; the drag term accounts for that (Nelson, chapter 3).
     """
     c, s = math.cos(linear.trim.alpha_rad), math.sin(linear.trim.alpha_rad)
     R_sb = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
@@ -109,7 +109,7 @@ def coefficients(linear: LinearModel, frame: Airframe) -> dict[str, float]:
 
 
 def textbook(linear: LinearModel) -> dict[str, Mode]:
-    """The modes by the approximations of the textbooks, from the derivatives of `linear`; by the name of the mode."""
+    """Textbook approximations of the modes from the derivatives of `linear`, by mode name."""
     A, speed = stability_axes(linear), linear.trim.airspeed_m_s
     return {
         "short_period": _pair("short_period", A[W, W] * A[Q, Q] - speed * A[Q, W], -(A[Q, Q] + A[W, W])),
@@ -121,7 +121,7 @@ def textbook(linear: LinearModel) -> dict[str, Mode]:
 
 
 def lanchester(airspeed_m_s: float, glide_ratio: float) -> Mode:
-    """The phugoid of an aeroplane that keeps its angle of attack: omega = sqrt(2) g / V, damping D / L / sqrt(2)."""
+    """The phugoid at a constant angle of attack: omega = sqrt(2) g / V, damping ratio D / L / sqrt(2)."""
     omega = math.sqrt(2.0) * G_M_S2 / airspeed_m_s
     return _pair("phugoid", omega**2, 2.0 * omega / (math.sqrt(2.0) * glide_ratio))
 
@@ -129,21 +129,21 @@ def lanchester(airspeed_m_s: float, glide_ratio: float) -> Mode:
 def _phugoid(A: Array) -> Mode:
     """s^2 + (D / C - B E / C^2) s + E / C of the quartic s^4 + B s^3 + C s^2 + D s + E (Bairstow).
 
-    The two-state formula of Nelson and Lanchester's hold the angle of attack.  A small aeroplane's pitch damping,
-    as strong as its stiffness, does not let it go back to that angle within a phugoid; this one knows it.
+    The formulas of Nelson (two states) and Lanchester keep the angle of attack constant.  In a small aeroplane pitch
+    damping is as strong as stiffness, and the angle of attack does not recover within a phugoid period.
     """
     _, b, c, d, e = np.poly(A[np.ix_(SYMMETRIC, SYMMETRIC)])
     return _pair("phugoid", e / c, d / c - b * e / c**2)
 
 
 def _dutch_roll(A: Array) -> Mode:
-    """Sideslip and yaw alone: omega^2 = (Y_b N_r - N_b Y_r + V N_b) / V, 2 zeta omega = -(Y_b / V + N_r)."""
+    """Sideslip and yaw only: omega^2 = (Y_b N_r - N_b Y_r + V N_b) / V, 2 zeta omega = -(Y_b / V + N_r)."""
     y_v, n_v, n_r = A[V, V], A[R, V], A[R, R]
     return _pair("dutch_roll", y_v * n_r - n_v * A[V, R], -(y_v + n_r))  # A[V, R] is Y_r - V
 
 
 def _spiral(A: Array) -> float:
-    """Minus the last coefficient of the characteristic equation of v p r roll over the one before."""
+    """Minus the ratio of the last two coefficients of the characteristic equation of v p r roll."""
     square = A[np.ix_(ASYMMETRIC, ASYMMETRIC)]
     *_, before, last = np.poly(square)
     return float(-last / before)

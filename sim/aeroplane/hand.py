@@ -1,8 +1,8 @@
-"""The hand that holds the aeroplane, moves it a little, pushes it and lets go.
+"""The hand that holds, sways, pushes and releases the aeroplane.
 
-Held, the motion is a closed form.  Pushed, the hand is a guide that gives whatever is lacking: the force that
-makes the acceleration over the ground exactly `push_m_s2` along the nose, and the moment that brings the body
-rates evenly to those of the release, whatever the motor and the air add.
+While held, the motion is a closed form.  During the push, the hand supplies the force that makes the acceleration
+over the ground exactly `push_m_s2` along the nose, and the moment that brings the body rates linearly to those of
+the release, whatever motor and air contribute.
 """
 
 import math
@@ -14,7 +14,7 @@ from sim.plant import HandThrow
 
 
 def check(start: HandThrow) -> None:
-    """Refuse a throw that cannot be."""
+    """Reject impossible parameters of a throw: ValueError."""
     if min(start.sway_hz) <= 0.0:
         raise ValueError(f"sway_hz {start.sway_hz} Hz: must be above 0 (for no sway set sway_rad_s to 0)")
     for what, value, unit in (
@@ -26,9 +26,9 @@ def check(start: HandThrow) -> None:
 
 
 def sway(start: HandThrow, t_s: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Roll, pitch, yaw [rad] and body rates against the earth [rad/s] of the aeroplane in the hand.
+    """Roll, pitch, yaw [rad] and body rates relative to the earth [rad/s] of the aeroplane in the hand.
 
-    The Euler rates are ``a sin(2 pi f t + phase)``, so the angles are its integral, about the attitude of the throw.
+    The Euler rates are ``a sin(2 pi f t + phase)``; the angles are their integral about the attitude of the throw.
     """
     angles = [0.0, start.pitch_rad, start.heading_rad]
     rates = [0.0, 0.0, 0.0]
@@ -52,7 +52,7 @@ def guide(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Force [N] and moment [N m] of the pushing hand, body axes, for one physics step.
 
-    wanted_b_rad_s : rates to have after the step     others : force and moment of everything but hand and gravity
+    wanted_b_rad_s : rates after the step     others : force and moment except those of hand and gravity
     Newton: ``m a = F_hand + F_others + m R^T g``; Euler: ``I dw = M_hand + M_others - w x I w``.
     """
     force_others, moment_others = others

@@ -1,7 +1,7 @@
-"""One JSBSim aeroplane in SI units: the only importer of jsbsim.
+"""One JSBSim aeroplane in SI units; the only importer of jsbsim.
 
-Loading, placing, reading and writing; each property name is resolved once.  Feet and pounds end here and in the
-one kernel of `sim.aeroplane.jsbsim_plant` that turns a whole tick into SI.
+Loading, placing, reading and writing; each property name is resolved once.  Feet and pounds occur only here and in
+the kernel of `sim.aeroplane.jsbsim_plant` that converts a tick to SI.
 """
 
 import math
@@ -35,7 +35,7 @@ INTEGRATORS = tuple(f"simulation/integrator/{a}" for a in (
 
 
 class _Silent(jsbsim.FGLogger):
-    """JSBSim's console output, dropped."""
+    """Discards JSBSim's console output."""
 
     def message(self, _text: str) -> None:
         return
@@ -54,9 +54,9 @@ class Model:
             raise ValueError(f"unknown aircraft '{aircraft}': choose {', '.join(known)}")
         self.airframe: dict[str, Any] = tomllib.loads((self.folder / "airframe.toml").read_text())
         self.dt_s = 1.0 / physics_hz
-        jsbsim.set_logger(_SILENT)  # anew for each model: JSBSim keeps a logger per thread
-        self.fdm = jsbsim.FGFDMExec(str(self.folder))  # else it looks for its own data, and only in some installations
-        self.fdm.set_dt(self.dt_s)  # before the model: the servos' lags are worked out while loading
+        jsbsim.set_logger(_SILENT)  # for each model: JSBSim keeps a logger per thread
+        self.fdm = jsbsim.FGFDMExec(str(self.folder))  # not its own data, absent in some installations
+        self.fdm.set_dt(self.dt_s)  # before loading, which computes the servo lags
         if not self.fdm.load_model_with_paths(aircraft, str(AIRCRAFT), str(self.folder), str(self.folder)):
             raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")
         self.run = self.fdm.run
@@ -97,30 +97,30 @@ class Model:
 
     @property
     def powered(self) -> bool:
-        """Whether there is a propeller: only JSBSim's own gives its advance ratio."""
+        """Whether the model has a propeller, and so an advance ratio."""
         return self._properties.get_node("propulsion/engine/advance-ratio") is not None
 
     def thrust_n(self) -> float:
-        """What the propeller pulled in the last step; 0 where there is none."""
+        """Thrust of the propeller in the last step; 0 without one."""
         return LB_TO_N * float(self.get("propulsion/engine/thrust-lbs")[0]) if self.powered else 0.0
 
     def inertia_tensor_kg_m2(self) -> Array:
-        """Inertia about the centre of gravity, body axes, shape (3, 3): products of inertia with their minus signs."""
+        """Inertia about the centre of gravity, body axes, shape (3, 3), off-diagonal elements negated products."""
         names = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
         xx, yy, zz, xy, yz, xz = SLUGFT2_TO_KGM2 * self.get(*(f"inertia/{name}-slugs_ft2" for name in names))
         return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
 
     def wing(self) -> tuple[float, float, float]:
-        """What the coefficients refer to: area [m2], span and mean chord [m]."""
+        """Reference quantities of the coefficients: area [m2], span and mean chord [m]."""
         area, span, chord = self.get("metrics/Sw-sqft", "metrics/bw-ft", "metrics/cbarw-ft")
         return area * FT_TO_M**2, span * FT_TO_M, chord * FT_TO_M
 
     def density_kg_m3(self) -> float:
-        """Of the air where the aeroplane is."""
+        """Air density at the aeroplane."""
         return float(self.get("atmosphere/rho-slugs_ft3")[0]) * SLUG_TO_KG / FT_TO_M**3
 
     def force_and_moment(self) -> tuple[Array, Array]:
-        """All forces but gravity [N] and all moments [N m] on the body in the last step, body axes."""
+        """All forces except gravity [N] and all moments [N m] on the body in the last step, body axes."""
         force = LB_TO_N * self.get(*(f"forces/fb{a}-total-lbs" for a in "xyz"))
         return force, LBFT_TO_NM * self.get(*(f"moments/{a}-total-lbsft" for a in "lmn"))
 
@@ -130,7 +130,7 @@ class Model:
         return np.concatenate([linear, self.get(*(f"accelerations/{a}dot-rad_sec2" for a in "pqr"))])
 
     def coming_rates(self) -> Array:
-        """Body rates [rad/s] that the next step will reach: what the last one has computed."""
+        """Body rates [rad/s] after the next step, as computed by the last one."""
         rates = self.get(*(f"velocities/{a}-rad_sec" for a in "pqr"))
         return rates + self.dt_s * self.accelerations()[3:]
 
@@ -138,11 +138,11 @@ class Model:
         self, height_m: float, euler_rad: tuple[float, float, float], v_b_m_s: Array,
         omega_b_rad_s: tuple[float, float, float], command: ActuatorCommand, air: Air, settle: int,
     ) -> None:  # fmt: skip
-        """Start anew above the launch point: velocity over the ground in body axes, servos at `command`, mean wind.
+        """Restart above the launch point: velocity over the ground in body axes, servos at `command`, mean wind.
 
-        Then the motion is frozen for `settle` steps (at least 1), in which the propeller finds its speed.
+        Then the motion is frozen for `settle` steps (at least 1) while the propeller speed settles.
         """
-        # The frozen motion is at rest in inertial space: the earth turns on below it, to the launch point.
+        # Frozen motion is at rest in inertial space: the earth turns below it, up to the launch point.
         ahead_deg = math.degrees(EARTH_RATE_RAD_S * settle * self.dt_s)
         self.put({"ic/lat-geod-deg": LATITUDE_DEG, "ic/long-gc-deg": LONGITUDE_DEG + ahead_deg})
         self.put({"ic/terrain-elevation-ft": 0.0})
@@ -150,9 +150,9 @@ class Model:
         self.put(dict(zip(("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"), euler_rad, strict=True)))
         self.put({f"ic/{a}-fps": float(v) / FT_TO_M for a, v in zip("uvw", v_b_m_s, strict=True)})
         self.put({f"ic/{a}-rad_sec": w for a, w in zip("pqr", omega_b_rad_s, strict=True)})
-        self.put({"atmosphere/turb-type": 0.0})  # JSBSim's own: above sea level, and astray in oblique winds
+        self.put({"atmosphere/turb-type": 0.0})  # not JSBSim's: referred to sea level, and wrong in oblique winds
         self.push(np.zeros(3), np.zeros(3))
-        self.fdm.run_ic()  # forgets commands and wind
+        self.fdm.run_ic()  # resets commands and wind
         self.put(dict(zip(WRITE, command[:4], strict=True)))
         wind_e = air.mean_wind_e_m_s(height_m)
         self.put({name: float(w) / FT_TO_M for name, w in zip(WIND, wind_e, strict=True)})
@@ -162,7 +162,7 @@ class Model:
         self.frozen(settle - 1)
 
     def frozen(self, steps: int) -> None:
-        """Run `steps` with the motion held: forces, servos and propeller go on."""
+        """Run `steps` with the motion frozen; forces, servos and propeller continue."""
         for write, _ in self._integrators:
             write(0.0)
         for _ in range(steps):
@@ -171,10 +171,10 @@ class Model:
             write(scheme)
 
     def settle(self) -> None:
-        """Hold the motion until the propeller turns steadily under the command and in the air of now.
+        """Freeze the motion until the propeller turns steadily at the current command and airspeed.
 
-        A step of any length dt takes its speed from n to n + dt f(n).  With dt = -1 / f'(n), the slope from the two
-        steps before, that is Newton's step to f = 0: ten of them do what takes seconds of simulated time.
+        A step of length dt changes its speed from n to n + dt f(n).  With dt = -1 / f'(n), the slope taken from the
+        two steps before, that is a Newton step towards f = 0: ten of them replace seconds of simulated time.
         """
         if self.powered:
             rpm = self.getter("propulsion/engine/propeller-rpm")
@@ -189,15 +189,15 @@ class Model:
                 slowing, before, now = change / dt_s, now, rpm()
                 dt_s = min(0.2, max(0.005, -1.0 / slope)) if slope < 0.0 else 0.03
             self.fdm.set_dt(self.dt_s)
-        self.frozen(2)  # what the model reads of the step before is now that of a steady propeller
+        self.frozen(2)  # values of the previous step are now those of a steady propeller
 
     def remember(self, on: bool) -> None:
-        """Off: integrate the velocity without a memory of past accelerations, which would smear a force that jumps."""
+        """Off: integrate the velocity without past accelerations, which would smear a step of the force."""
         write, scheme = self._integrators[1]
         write(scheme if on else 1.0)
 
     def push(self, force_b_n: Array, moment_b_nm: Array) -> None:
-        """Set the force and the moment of the hand, body axes; they stay until set again."""
+        """Set the force and the moment of the hand, body axes, until set again."""
         hand_force, moment = "external_reactions/hand", "external_reactions/hand_moment"
         self.put({f"{hand_force}/{a}": float(f) / LB_TO_N for a, f in zip("xyz", force_b_n, strict=True)})
         self.put({f"{moment}/{a}": float(m) / LBFT_TO_NM for a, m in zip("lmn", moment_b_nm, strict=True)})

@@ -1,8 +1,8 @@
-"""JSBSim behind the Plant protocol.
+"""JSBSim as a Plant.
 
-A tick is four writes, a few physics steps with no reads between them, and one packed read that a kernel turns
-into the truth row in SI units.  The inertial means of the row come from the change of attitude and velocity
-over the tick (`sim.truth.integrate_imu`).
+A tick consists of four writes, a few physics steps without reads, and one packed read that a kernel converts to the
+truth row in SI units.  The inertial means of the row come from the change of attitude and velocity over the tick
+(`sim.truth.integrate_imu`).
 """
 
 import math
@@ -24,7 +24,7 @@ from sim.place import LATITUDE_DEG
 from sim.plant import HandThrow, InFlight, SimulationDiverged, Start
 from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
 
-# What is read after each tick: field of the state record, its JSBSim properties.
+# Read after each tick: field of the state record, JSBSim properties.
 READ: dict[str, tuple[str, ...]] = {
     "euler_rad": ("attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad"),
     "omega_b_rad_s": ("velocities/pi-rad_sec", "velocities/qi-rad_sec", "velocities/ri-rad_sec"),
@@ -35,14 +35,14 @@ READ: dict[str, tuple[str, ...]] = {
     "motor": ("propulsion/engine/propeller-rpm", "propulsion/engine/thrust-lbs"),
     "contact": ("forces/fbz-gear-lbs",),
 }
-# Rates of the air, which an aeroplane's damping terms take off its own (JSBSim's own turbulence rates cannot be set).
+# Rates of the air, subtracted in the damping terms of the models (those of JSBSim's turbulence cannot be set).
 AIR_RATES = tuple(f"gust/{a}-rad_sec" for a in "pqr")
 STATE_DTYPE = np.dtype(
     [
-        *((name, "f8", (len(properties),)) for name, properties in READ.items()),  # packed into its first bytes
+        *((name, "f8", (len(properties),)) for name, properties in READ.items()),  # packed into the first bytes
         ("R_eb", "f8", (3, 3)),  # at the end of the previous tick
         ("v_e_m_s", "f8", (3,)),
-        ("origin_e_m", "f8", (3,)),  # where the start is, from the launch point
+        ("origin_e_m", "f8", (3,)),  # of the start, from the launch point
         ("earth_rate_e", "f8", (3,)),
         ("g_m_s2", "f8"),
         ("dt_s", "f8"),
@@ -57,7 +57,7 @@ OUTCOMES = (None, Outcome.GROUND_CONTACT, Outcome.LEFT_BOX, Outcome.DIVERGED)
 
 @dataclass(frozen=True, slots=True)
 class FlightBox:
-    """Where the flight may be: a cylinder around the launch point; beyond it the flight is over."""
+    """A cylinder around the launch point; leaving it ends the flight."""
 
     radius_m: float = 3000.0
     height_m: float = 1000.0
@@ -76,7 +76,7 @@ def rotation_of(roll_rad, pitch_rad, yaw_rad, R_eb):  # type: ignore[no-untyped-
 
 @kernel
 def complete(truth, k, state):  # type: ignore[no-untyped-def]
-    """Fill what follows from attitude, velocity and wind of row k: inertial means, airspeed, alpha, beta, time."""
+    """Compute inertial means, airspeed, alpha, beta and time of row k from its attitude, velocity and wind."""
     row, s = truth[k], state[0]
     integrate_imu(s.R_eb, s.v_e_m_s, row, s.dt_s, s.g_m_s2, s.earth_rate_e)
     R = row.R_eb
@@ -97,7 +97,7 @@ def complete(truth, k, state):  # type: ignore[no-untyped-def]
 
 @kernel
 def observe(truth, k, state):  # type: ignore[no-untyped-def]
-    """Turn what JSBSim reports into truth row k, in SI; return the index of the outcome in OUTCOMES, 0 to fly on."""
+    """Convert the JSBSim state to truth row k, in SI; returns the index of the outcome in OUTCOMES, 0 to continue."""
     row, s = truth[k], state[0]
     rotation_of(s.euler_rad[0], s.euler_rad[1], s.euler_rad[2], row.R_eb)
     rate2 = speed2 = 0.0
@@ -131,10 +131,10 @@ class JsbsimPlant:
     start : in the air or thrown by hand
     air : wind, gusts, turbulence, thermals
     rates : physics and inertial rates
-    seed, flight : which random streams (the turbulence alone draws any here)
-    box : where the flight may be; a start outside it is refused
+    seed, flight : of the random streams (used here only by turbulence)
+    box : limits of the flight; a start outside is rejected
 
-    Raises ValueError for an unknown aircraft or a start that cannot be.
+    Raises ValueError for an unknown aircraft or an impossible start.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class JsbsimPlant:
             hand.check(start)
             self._hold_ticks = rates.ticks(start.hold_s)
             self._release_tick = self._hold_ticks + max(1, rates.ticks(start.push_s))
-            self._hand_ticks = self._release_tick + 1  # the first tick of the flight puts its integrator away
+            self._hand_ticks = self._release_tick + 1  # the first tick of the flight restores the integrator
         self.release_s = self._release_tick * self.dt_s
         self._load()
         span_m = FT_TO_M * float(self.model.get("metrics/bw-ft")[0])
@@ -180,7 +180,7 @@ class JsbsimPlant:
         s["dt_s"], s["box_radius_m"], s["box_height_m"] = self.dt_s, box.radius_m, box.height_m
 
     def _load(self) -> None:
-        """A JSBSim of its own for each flight: blown-up states outlive any reset."""
+        """A new JSBSim for each flight: a diverged state survives any reset."""
         self.model = Model(self._aircraft, self._physics_hz)
         self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
         self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
@@ -189,7 +189,7 @@ class JsbsimPlant:
         self._pack = Struct(f"{len(self._getters)}d").pack_into
 
     def reset(self, log: Log) -> None:
-        """Put the aeroplane at its start; the rows of `log` are filled from tick 0 on."""
+        """Put the aeroplane at its start; the rows of `log` are filled from tick 0."""
         self._load()
         self._truth = log.truth
         s = self._state[0]
@@ -203,7 +203,7 @@ class JsbsimPlant:
             self._start_in_flight(start)
 
     def _start_in_flight(self, start: InFlight) -> None:
-        """Trimmed relative to the moving air, heading as asked; servos and propeller as in the trim."""
+        """Trimmed relative to the moving air, heading as in the start; servos and propeller as in the trim."""
         t = self.trimmed
         euler_rad = t.euler_rad(start.heading_rad)
         R_eb = np.empty((3, 3))
@@ -216,11 +216,11 @@ class JsbsimPlant:
         omega_b_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0), command: ActuatorCommand = NEUTRAL,
         settle_s: float = 1.0,
     ) -> None:  # fmt: skip
-        """Put the aeroplane into any state, to fly on from there.
+        """Put the aeroplane into any state, from which it continues.
 
         p_e_m : (north, east, down) from the launch point       euler_rad : roll, pitch, yaw
-        v_b_m_s : (3,) velocity over the ground, body axes      omega_b_rad_s : body rates against the earth
-        command : where the servos are                          settle_s : time for the propeller to find its speed
+        v_b_m_s : (3,) velocity over the ground, body axes      omega_b_rad_s : body rates relative to the earth
+        command : servo positions                               settle_s : time for the propeller speed to settle
         """
         s = self._state[0]
         rotation_of(*euler_rad, s["R_eb"])
@@ -232,12 +232,12 @@ class JsbsimPlant:
             self._blow(*self._moving_air.now)
 
     def _anchor(self, p_e_m: tuple[float, float, float]) -> None:
-        """Let the place where JSBSim now is be `p_e_m`."""
+        """Define the current position of JSBSim as `p_e_m`."""
         n, e, u = FT_TO_M * self.model.get(*READ["p_neu_ft"])
         self._state[0]["origin_e_m"] = np.array(p_e_m) - np.array([n, e, -u])
 
     def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
-        """Fly tick `k` under `command` and fill truth row k; an Outcome where the flight ended in it."""
+        """Fly tick `k` with `command` and fill truth row k; an Outcome if the flight ended in it."""
         if self._air_moves:
             self._blow(*self._moving_air.blow(self._truth, k))
         if k < self._hand_ticks:
@@ -247,15 +247,15 @@ class JsbsimPlant:
         try:
             for _ in range(self.steps):
                 run()
-        except RuntimeError as error:  # JSBSim's own: it will not go on from here
-            raise SimulationDiverged(f"JSBSim gave up at {k * self.dt_s:.2f} s: {error}") from error
+        except RuntimeError as error:  # raised by JSBSim, which cannot continue
+            raise SimulationDiverged(f"JSBSim failed at {k * self.dt_s:.2f} s: {error}") from error
         return self._observe(k)
 
     def _blow(self, *air: float) -> None:
-        """Set the wind (3) and the rates of the air (3), which hold over the tick."""
+        """Set the wind (3) and the rates of the air (3), constant over the tick."""
         for write, speed_m_s in zip(self._wind, air[:3], strict=True):
             write(speed_m_s / FT_TO_M)
-        for write, rate_rad_s in zip(self._air_rates, air[3:], strict=False):  # none where the aeroplane has none
+        for write, rate_rad_s in zip(self._air_rates, air[3:], strict=False):  # optional in a model
             write(rate_rad_s)
 
     def _command(self, command: ActuatorCommand) -> None:
@@ -270,21 +270,21 @@ class JsbsimPlant:
         if ended is Outcome.DIVERGED:
             speed_m_s, rate_rad_s = (np.linalg.norm(self._truth[name][k]) for name in ("v_e_m_s", "omega_b_rad_s"))
             raise SimulationDiverged(
-                f"the simulation blew up at {(k + 1) * self.dt_s:.2f} s: {speed_m_s:.3g} m/s, {rate_rad_s:.3g} rad/s"
+                f"the simulation diverged at {(k + 1) * self.dt_s:.2f} s: {speed_m_s:.3g} m/s, {rate_rad_s:.3g} rad/s"
             )
         return ended
 
     def run_bare(self, n_ticks: int) -> None:
-        """The physics of `n_ticks` and nothing else, commands as they are: what a benchmark compares with."""
+        """Run the physics of `n_ticks` only, with constant commands, as the reference of benchmarks."""
         run = self.model.run
         for _ in range(n_ticks * self.steps):
             run()
 
     def _in_hand(self, k: int, command: ActuatorCommand) -> Outcome | None:
-        """Tick k of a throw, up to and with the first tick of the flight."""
+        """Tick k of a throw, up to and including the first tick of the flight."""
         start = self.start
         if not isinstance(start, HandThrow):
-            raise TypeError("only a thrown aeroplane is ever in the hand")
+            raise TypeError("only a thrown aeroplane is held in the hand")
         if k < self._hold_ticks:
             self._hold(start, k)
             return None
@@ -294,7 +294,7 @@ class JsbsimPlant:
         first = (k - self._hold_ticks) * self.steps
         last = (self._release_tick - self._hold_ticks) * self.steps
         for step in range(first + 1, first + self.steps + 1):
-            # What is set before a run acts in the next one: nothing may be left for the first step of the flight.
+            # A force set before a run acts in the next one; none may remain for the first step of the flight.
             if step < last:
                 self._push(start, (step + 1) / last)
             elif step == last:
@@ -308,7 +308,7 @@ class JsbsimPlant:
         return outcome
 
     def _hold(self, start: HandThrow, k: int) -> None:
-        """Truth row k in the hand: at rest at the launch point but for the sway."""
+        """Truth row k in the hand: at rest at the launch point except for the sway."""
         euler_rad, rates = hand.sway(start, (k + 1) * self.dt_s)
         row = self._truth[k]
         for name in MOVING_PARTS:
@@ -322,7 +322,7 @@ class JsbsimPlant:
         complete(self._truth, k, self._state)
 
     def _begin_push(self, start: HandThrow) -> None:
-        """JSBSim takes over where the closed form ends, the hand already pushing."""
+        """JSBSim takes over from the closed form, with the hand already pushing."""
         euler_rad, rates = hand.sway(start, self._hold_ticks * self.dt_s)
         self._rates_at_push = np.array(rates)
         self.begin((0.0, 0.0, -start.height_m), euler_rad, np.zeros(3), rates, settle_s=0.0)
@@ -333,7 +333,7 @@ class JsbsimPlant:
         self.model.remember(False)
 
     def _push(self, start: HandThrow, part: float) -> None:
-        """Set the hand's force and moment so that the rates are right when `part` (0..1) of the push is over."""
+        """Set force and moment of the hand for the rates wanted after the fraction `part` of the push."""
         force, moment = self.model.force_and_moment()
         others = force - self._hand[0], moment - self._hand[1]
         wanted = (1.0 - part) * self._rates_at_push + part * np.array(start.release_rate_b_rad_s)

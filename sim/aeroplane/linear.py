@@ -1,13 +1,13 @@
 """Small motions about a trim: the linear model, by central differences through JSBSim, and its natural modes.
 
 States: velocity over the ground in body axes (u, v, w), body rates (p, q, r), Euler angles (roll, pitch, yaw) and
-position (north, east, down); inputs: aileron, elevator, rudder, throttle.  The air is still, the surfaces are held,
-and the propeller is taken as always turning at the speed that goes with the state (its time constant, 0.07 s, is
-short against all but the roll).
+position (north, east, down); inputs: aileron, elevator, rudder, throttle.  The air is still, the surfaces are fixed,
+and the propeller turns at the steady speed of each state (its time constant, 0.07 s, is short compared with all modes
+except roll).
 
-Place and heading act on nothing but through the turning earth and are left out of the modes.  What is left, nine
-states, is four symmetric ones (short period, phugoid), four asymmetric ones (roll subsidence, Dutch roll, spiral)
-and the height, whose thinner air gives a root near zero.
+Position and heading matter only through the earth's rotation and are left out of the modes.  Of the other nine
+states four are symmetric (short period, phugoid), four asymmetric (roll subsidence, Dutch roll, spiral), and height
+gives a root near zero through the air density.
 
 References
 ----------
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 STATES = ("u", "v", "w", "p", "q", "r", "roll", "pitch", "yaw", "north", "east", "down")
 INPUTS = ("aileron", "elevator", "rudder", "throttle")
-STEPS = np.array([1e-3] * 6 + [1e-4] * 3 + [1.0] * 3)  # of the differences: m/s, rad/s, rad, m
+STEPS = np.array([1e-3] * 6 + [1e-4] * 3 + [1.0] * 3)  # of finite differences: m/s, rad/s, rad, m
 COMMAND_STEP = 1e-3
 SYMMETRIC, ASYMMETRIC, HEIGHT = (0, 2, 4, 7), (1, 3, 5, 6), 11
 DYNAMIC = (*SYMMETRIC, *ASYMMETRIC, HEIGHT)
@@ -43,7 +43,7 @@ class LinearModel:
     """d(dx)/dt = A dx + B du about a trim.
 
     A : (12, 12), states as in STATES       B : (12, 4), inputs as in INPUTS
-    trim : where                            x, u : states and commands there
+    trim : of the linearisation             x, u : states and commands there
     """
 
     A: Array
@@ -55,14 +55,14 @@ class LinearModel:
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """A natural motion: two eigenvalues, a conjugate pair or both real, or a single real one."""
+    """A natural mode: two eigenvalues, a conjugate pair or both real, or a single real one."""
 
     name: str
     eigenvalues: tuple[complex, ...]
 
     @property
     def omega_rad_s(self) -> float:
-        """Natural frequency; of a single real root its magnitude; NaN of a pair of which one half diverges."""
+        """Natural frequency; of a single real root its magnitude; NaN for two real roots of which one diverges."""
         product = math.prod(abs(e) for e in self.eigenvalues)
         if len(self.eigenvalues) == 2 and (self.eigenvalues[0] * self.eigenvalues[1]).real < 0.0:
             return math.nan
@@ -70,28 +70,28 @@ class Mode:
 
     @property
     def damping(self) -> float:
-        """Part of the critical damping; of a single real root 1 or -1."""
+        """Damping ratio; 1 or -1 for a single real root."""
         return float(-np.mean([e.real for e in self.eigenvalues]) / self.omega_rad_s)
 
     @property
     def period_s(self) -> float:
-        """Of the oscillation; infinite where there is none."""
+        """Period of the oscillation; infinite if there is none."""
         turning = max(abs(e.imag) for e in self.eigenvalues)
         return 2.0 * math.pi / turning if turning > 0.0 else math.inf
 
     @property
     def slowest_per_s(self) -> float:
-        """Real part of the root that lasts longest, or grows fastest."""
+        """Largest real part of the roots."""
         return max(e.real for e in self.eigenvalues)
 
     @property
     def time_to_half_s(self) -> float:
-        """Of the amplitude; infinite where it grows."""
+        """Time to half amplitude; infinite if it grows."""
         return math.log(2.0) / -self.slowest_per_s if self.slowest_per_s < 0.0 else math.inf
 
     @property
     def time_to_double_s(self) -> float:
-        """Of the amplitude; infinite where it decays."""
+        """Time to double amplitude; infinite if it decays."""
         return math.log(2.0) / self.slowest_per_s if self.slowest_per_s > 0.0 else math.inf
 
 
@@ -104,11 +104,11 @@ def euler_rates(euler_rad: Array, omega_b_rad_s: Array) -> Array:
 
 
 def derivative(model: "Model", x: Array, u: ActuatorCommand) -> Array:
-    """dx/dt of the whole aeroplane at state `x` (12,) under `u`, the propeller turning steadily."""
+    """dx/dt of the aeroplane at state `x` (12,) and command `u`, the propeller turning steadily."""
     roll, pitch, yaw = (float(angle) for angle in x[6:9])
     p, q, r = (float(rate) for rate in x[3:6])
     settled(model, -float(x[11]), (roll, pitch, yaw), x[:3], (p, q, r), u)
-    body_e = np.array([earth_to_body(axis, (roll, pitch, yaw)) for axis in np.eye(3)])  # rows: earth axes in the body
+    body_e = np.array([earth_to_body(axis, (roll, pitch, yaw)) for axis in np.eye(3)])  # rows: earth axes, body frame
     return np.concatenate([model.accelerations(), euler_rates(x[6:9], x[3:6]), body_e @ x[:3]])
 
 
@@ -123,7 +123,7 @@ def linearise(model: "Model", t: Trim, height_m: float = 60.0) -> LinearModel:
     x, u = state_of(t, height_m), t.command
     A, B = np.zeros((12, 12)), np.zeros((12, 4))
     for j, h in enumerate(STEPS):
-        if STATES[j] not in ("north", "east"):  # they act on nothing
+        if STATES[j] not in ("north", "east"):  # no effect
             step = np.zeros(12)
             step[j] = h
             A[:, j] = (derivative(model, x + step, u) - derivative(model, x - step, u)) / (2.0 * h)
@@ -136,11 +136,11 @@ def linearise(model: "Model", t: Trim, height_m: float = 60.0) -> LinearModel:
 
 
 def modes(linear: LinearModel) -> tuple[Mode, ...]:
-    """The natural modes, told apart by which states take part in them.
+    """The natural modes, identified by the participation of the states.
 
-    The participation of state k in mode i is |left eigenvector i, k| times |right eigenvector i, k|: it does not
-    depend on the units of the states.  Where roll and spiral have joined into a slow oscillation, as dihedral and
-    little roll damping make them, that is one mode, ``roll_spiral``.
+    The participation of state k in mode i is |left eigenvector i, k| times |right eigenvector i, k|, independent of
+    the units of the states.  If roll and spiral combine into a slow oscillation, as with dihedral and little roll
+    damping, they form one mode, ``roll_spiral``.
     """
     values, right = np.linalg.eig(linear.A[np.ix_(DYNAMIC, DYNAMIC)])
     part = np.abs(right) * np.abs(np.linalg.inv(right)).T  # [state, mode]
@@ -159,7 +159,7 @@ def _mode(name: str, values: Array) -> Mode:
 
 
 def _asymmetric(values: Array, part: Array) -> tuple[Mode, ...]:
-    """Roll, Dutch roll and spiral among four roots; `part` [v p r roll, root] says what takes part in each."""
+    """Roll, Dutch roll and spiral among four roots; `part` [v p r roll, root] are the participations."""
     turning = np.abs(values.imag) > 1e-9
     slip = part[SIDE_SPEED] + part[YAW_RATE]
     if turning.sum() == 2:
@@ -170,7 +170,7 @@ def _asymmetric(values: Array, part: Array) -> tuple[Mode, ...]:
     order = np.argsort(-slip) if turning.all() else np.argsort(np.abs(values))[::-1]
     if turning.all():
         return _mode("dutch_roll", values[order[:2]]), _mode("roll_spiral", values[order[2:]])
-    # Four real roots: yaw and sideslip too are overdamped.
+    # Four real roots: Dutch roll is overdamped, too.
     rolls = int(np.argmax(part[ROLL_RATE]))
     spiral = int(order[-1])
     others = [i for i in range(4) if i not in (rolls, spiral)]

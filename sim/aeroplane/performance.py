@@ -1,6 +1,6 @@
-"""What an aeroplane can do, each figure from trims of the whole model: stall, glide, climb, speed, turn and roll.
+"""Performance from trims of the whole model: stall, glide, climb, top speed, turns and roll.
 
-The glide polar is walked by angle of attack, motor off, because speed turns back at the stall and angle does not.
+The glide polar, motor off, is computed by angle of attack, because speed is not monotonic at the stall.
 """
 
 import math
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from sim.aeroplane.jsbsim_model import Model
 
 STEP_RAD = math.radians(0.25)
-FASTEST = 3.0  # times the stall speed: where the polar ends
+FASTEST = 3.0  # times the stall speed, end of the polar
 BANKS_DEG = (15.0, 30.0, 45.0, 60.0)
-BANKED_ENOUGH_RAD, LONG_ENOUGH_S = math.radians(60.0), 3.0  # where the roll ends
+BANKED_ENOUGH_RAD, LONG_ENOUGH_S = math.radians(60.0), 3.0  # end of the roll manoeuvre
 
 
 @dataclass(frozen=True, slots=True)
 class Roll:
-    """Full deflection from the cruise: which surface, the greatest roll rate, and the time to a bank of 45 deg."""
+    """Roll at full deflection from cruise: surface, maximum roll rate, and time to 45 deg of bank."""
 
     surface: str
     rate_rad_s: float
@@ -36,11 +36,11 @@ class Performance:
     """Trims of one aeroplane at one height.
 
     polar : glides with the motor off, from fast to slow
-    stall : the slowest glide                               stall_by : "lift", or "elevator" where that is at its stop
+    stall : the slowest glide                               stall_by : "lift", or "elevator" if that is at its stop
     best_glide, min_sink : of the polar
     climbs : full throttle, by speed                        levels : level flight, by speed; glides without a motor
     best_climb, steepest, top_speed : None without a motor
-    turns : steady turns at BANKS_DEG, as far as it can     turns_end : what it cannot, empty where it can all
+    turns : steady turns at BANKS_DEG, as far as possible   turns_end : the limit, empty if all are possible
     """
 
     height_m: float
@@ -61,7 +61,7 @@ class Performance:
 
 
 def measure(model: "Model", height_m: float = 60.0) -> Performance:
-    """Fly all trims of `Performance`, about a second."""
+    """Compute all trims of `Performance`; takes about a second."""
     cruise = trim(model, model.airframe["cruise"]["airspeed_m_s"], height_m)
     glide = Glides(model, height_m)
     polar, stall_by = glide.polar(cruise)
@@ -89,15 +89,15 @@ class Glides:
         self._search = Search(model, ("airspeed_m_s", "climb_rad", "roll_rad", *surfaces(model)), height_m)
 
     def at(self, alpha_rad: float, near: Trim) -> Trim | None:
-        """The glide at `alpha_rad`, None where it cannot be held; `near` is a glide to start from."""
+        """The glide at `alpha_rad`, None if there is none; `near` is a glide to start from."""
         found, left, _ = self._search.run(replace(near, alpha_rad=alpha_rad, throttle=0.0))
         return found if np.max(np.abs(left)) < 1e-9 else None
 
     def polar(self, start: Trim) -> tuple[tuple[Trim, ...], str]:
-        """Glides a quarter of a degree apart, from fast to beyond the slowest, and what ends them: lift or elevator."""
+        """Glides in steps of 0.25 deg, from fast to beyond the slowest, and the limit: lift or elevator."""
         first = self.at(start.alpha_rad, replace(start, climb_rad=-0.1))
         if first is None:
-            raise ValueError(f"alpha {math.degrees(start.alpha_rad):.1f} deg of the cruise: no glide there")
+            raise ValueError(f"no glide at the angle of attack of the cruise, {math.degrees(start.alpha_rad):.1f} deg")
         slow, ended = [first], "elevator"
         while (t := self.at(slow[-1].alpha_rad + STEP_RAD, slow[-1])) is not None:
             slow.append(t)
@@ -113,7 +113,7 @@ class Glides:
         return (*fast[:0:-1], *slow), ended
 
     def best(self, polar: tuple[Trim, ...], merit: Callable[[Trim], float]) -> Trim:
-        """The glide of greatest merit, between the two neighbours of the best of `polar`."""
+        """The glide of highest merit, refined between the neighbours of the best of `polar`."""
         i = max(range(len(polar)), key=lambda k: merit(polar[k]))
         low, high = polar[max(i - 1, 0)].alpha_rad, polar[min(i + 1, len(polar) - 1)].alpha_rad
         tried = [polar[i]]
@@ -130,7 +130,7 @@ class Glides:
 
 
 def _sweep(model: "Model", speeds_m_s: np.ndarray, height_m: float, throttle: float | None) -> tuple[Trim, ...]:
-    """Straight flight at each speed that has it, at a throttle or level."""
+    """Straight flight at each possible speed, at a throttle or level (None)."""
     found: list[Trim] = []
     for speed in speeds_m_s:
         try:
@@ -142,7 +142,7 @@ def _sweep(model: "Model", speeds_m_s: np.ndarray, height_m: float, throttle: fl
 
 
 def _best_climb(model: "Model", climbs: tuple[Trim, ...], height_m: float, merit: Callable[[Trim], float]) -> Trim:
-    """The climb of greatest merit, between the two neighbours of the best of `climbs`."""
+    """The climb of highest merit, refined between the neighbours of the best of `climbs`."""
     i = max(range(len(climbs)), key=lambda k: merit(climbs[k]))
     tried = [climbs[i]]
 
@@ -156,21 +156,21 @@ def _best_climb(model: "Model", climbs: tuple[Trim, ...], height_m: float, merit
 
 
 def _top_speed(model: "Model", cruise: Trim, height_m: float) -> Trim:
-    """Level flight at full throttle: the speed is what is looked for."""
+    """Level flight at full throttle."""
     search = Search(model, ("airspeed_m_s", "alpha_rad", "roll_rad", *surfaces(model)), height_m)
     guess = replace(cruise, throttle=1.0, climb_rad=0.0, airspeed_m_s=1.5 * cruise.airspeed_m_s)
     found, left, _ = search.run(guess)
     if not np.max(np.abs(left)) < 1e-9:
         raise ValueError(
-            f"throttle 1: '{model.folder.name}' has no level flight at full throttle, more motor is needed"
+            f"throttle 1: '{model.folder.name}' has no level flight at full throttle, its motor is too weak"
         )
     return found
 
 
 def turns(model: "Model", min_sink: Trim, height_m: float) -> tuple[tuple[Trim, ...], str]:
-    """Steady turns to the right and what ends them; level with a motor, gliding without.
+    """Steady right turns and their limit; level with a motor, gliding without.
 
-    Each is flown at a twentieth above the speed of least sink for its load, which goes with sqrt(load).
+    Each is flown 5 % above the minimum-sink speed for its load factor, which grows with sqrt(load factor).
     """
     found: list[Trim] = []
     for bank_deg in BANKS_DEG:
@@ -184,23 +184,23 @@ def turns(model: "Model", min_sink: Trim, height_m: float) -> tuple[tuple[Trim, 
 
 
 def radius_m(t: Trim) -> float:
-    """Of a turn, over still ground."""
+    """Radius of a turn in still air."""
     return t.airspeed_m_s * math.cos(t.climb_rad) / abs(t.turn_rate_rad_s)
 
 
 def roll(model: "Model", cruise: Trim, height_m: float) -> Roll:
-    """Hold full aileron, or full rudder where there is none, until 60 deg of bank or for three seconds."""
+    """Hold full aileron, or rudder without ailerons, until 60 deg of bank or for three seconds."""
     surface = "aileron" if surfaces(model)[0] == "aileron" else "rudder"
     euler_rad = cruise.euler_rad()
     settled(model, height_m, euler_rad, cruise.air_velocity_b_m_s, cruise.omega_b_rad_s, cruise.command)
     model.setter(f"fcs/{surface}-cmd-norm")(1.0)
     bank, rate = model.getter("attitude/phi-rad"), model.getter("velocities/p-rad_sec")
-    greatest, to_45 = 0.0, math.inf
+    fastest, to_45 = 0.0, math.inf
     for k in range(round(LONG_ENOUGH_S / model.dt_s)):
         model.run()
-        greatest = max(greatest, rate())
+        fastest = max(fastest, rate())
         if bank() > math.radians(45.0):
             to_45 = min(to_45, (k + 1) * model.dt_s)
         if bank() > BANKED_ENOUGH_RAD:
             break
-    return Roll(surface, greatest, to_45)
+    return Roll(surface, fastest, to_45)

@@ -1,11 +1,11 @@
-"""Trimmed flight by root finding: the attitude and the commands at which nothing accelerates.
+"""Trimmed flight by root finding: attitude and commands at zero acceleration.
 
-A steady flight is ten numbers (`Trim`): speed, flow angles, bank, climb, rate of turn and four commands.  JSBSim
-gives six accelerations.  Four of the ten are given, Newton's method finds the other six: level flight, climb,
-glide and steady turn differ only in which.
+A steady flight is ten numbers (`Trim`): speed, flow angles, bank, climb, turn rate and four commands.  JSBSim gives
+six accelerations.  Four of the ten numbers are given and Newton's method finds the other six; level flight, climb,
+glide and steady turn differ only in the choice.
 
-JSBSim's own trim needs throttle to balance the drag, which a glider has not, and marches a propeller this small
-with a step at which it is unstable.
+JSBSim's trim is not used: it needs throttle to balance the drag, which a glider lacks, and integrates a propeller this
+small with an unstable step.
 
 References
 ----------
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from sim.aeroplane.jsbsim_model import Model
 
 TOLERANCE = 1e-10  # of the accelerations, m/s2 and rad/s2; JSBSim's round-off leaves about 1e-12
-G_M_S2 = 9.81  # for first guesses alone
+G_M_S2 = 9.81  # for first guesses only
 
-# What may be free: smallest and greatest value, and the most that one step of the search may change it.
+# Possible unknowns: minimum, maximum, and largest change in one step of the search.
 BOUNDS: dict[str, tuple[float, float, float]] = {
     "airspeed_m_s": (0.5, 100.0, 2.0),
     "alpha_rad": (-0.6, 1.2, 0.05),
@@ -48,7 +48,7 @@ BOUNDS: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Trim:
-    """A steady flight; speed and angles against the air, commands in -1..1, throttle in 0..1.
+    """A steady flight; speed and angles relative to the air, commands in -1..1, throttle in 0..1.
 
     alpha_rad, beta_rad : angles of attack and sideslip         roll_rad : bank angle (Euler)
     climb_rad : angle of the path through the air, + upwards    turn_rate_rad_s : rate of change of heading
@@ -67,7 +67,7 @@ class Trim:
 
     @classmethod
     def of(cls, cruise: dict[str, Any]) -> "Trim":
-        """From the table `cruise` of an airframe.toml; without a motor it is a glide."""
+        """From the table `cruise` of an airframe.toml; a glide without a motor."""
         alpha_rad, climb_rad = math.radians(cruise["alpha_deg"]), math.radians(cruise.get("flight_path_deg", 0.0))
         return cls(cruise["airspeed_m_s"], alpha_rad, cruise["elevator"], cruise["throttle"], climb_rad=climb_rad)
 
@@ -82,7 +82,7 @@ class Trim:
 
     @property
     def pitch_rad(self) -> float:
-        """The pitch angle that gives the path its angle (Stevens & Lewis, section 3.6, rate-of-climb constraint)."""
+        """Pitch angle for the climb angle (Stevens & Lewis, section 3.6, rate-of-climb constraint)."""
         a = math.cos(self.alpha_rad) * math.cos(self.beta_rad)
         b = math.sin(self.roll_rad) * math.sin(self.beta_rad)
         b += math.cos(self.roll_rad) * math.sin(self.alpha_rad) * math.cos(self.beta_rad)
@@ -101,7 +101,7 @@ class Trim:
 
     @property
     def omega_b_rad_s(self) -> tuple[float, float, float]:
-        """Body rates of turning about the vertical (Stevens & Lewis, section 3.6)."""
+        """Body rates of a turn about the vertical (Stevens & Lewis, section 3.6)."""
         rate, roll, pitch = self.turn_rate_rad_s, self.roll_rad, self.pitch_rad
         return (
             -rate * math.sin(pitch),
@@ -122,11 +122,10 @@ def earth_to_body(vector_e: Sequence[float] | Array, euler_rad: tuple[float, flo
 def accelerations(
     model: "Model", t: Trim, height_m: float, heading_rad: float = 0.0, wind_e_m_s: Sequence[float] = STILL.wind_e_m_s
 ) -> Array:
-    """What remains at `t`, the propeller turning steadily, shape (6,).
+    """Accelerations at `t` with the propeller turning steadily, shape (6,).
 
-    Rates of change of the velocity through the air, in body axes [m/s2], and of the body rates [rad/s2].  In a
-    turn the wind changes its body components, and with them so does the velocity over the ground; that part is
-    no acceleration of the aeroplane and is taken out.
+    Rates of change of the velocity through the air, in body axes [m/s2], and of the body rates [rad/s2].  In a turn
+    the body components of the wind change, and so does the velocity over the ground; that part is removed.
     """
     euler_rad, omega_b = t.euler_rad(heading_rad), t.omega_b_rad_s
     wind_b = earth_to_body(wind_e_m_s, euler_rad)
@@ -143,7 +142,7 @@ def settled(
     omega_b_rad_s: tuple[float, float, float], command: ActuatorCommand,
     wind_e_m_s: Sequence[float] = STILL.wind_e_m_s,
 ) -> None:  # fmt: skip
-    """Put `model` into a state (velocity over the ground), the propeller as fast as it stays there."""
+    """Put `model` into a state (velocity over the ground) with the propeller at its steady speed."""
     n, e, d = wind_e_m_s
     air = replace(STILL, wind_e_m_s=(float(n), float(e), float(d)))
     model.place(height_m, euler_rad, v_b_m_s, omega_b_rad_s, command, air, 1)
@@ -152,10 +151,10 @@ def settled(
 
 @dataclass(slots=True)
 class Search:
-    """Newton's method for six of a trim's numbers, with Broyden's update of the Jacobian between fresh ones.
+    """Newton's method for six numbers of a trim, with Broyden updates of the Jacobian between evaluations.
 
-    model, height_m, heading_rad, wind_e_m_s : which aeroplane, where, in which air
-    free : names of the six fields of `Trim` that are looked for
+    model, height_m, heading_rad, wind_e_m_s : aeroplane, place and air
+    free : names of the six unknown fields of `Trim`
     """
 
     model: "Model"
@@ -181,7 +180,7 @@ class Search:
         return np.array(columns).T
 
     def run(self, guess: Trim) -> tuple[Trim, Array, Array]:
-        """Where the search ends: the trim, what remains there, and where the last step wanted to go, by `free`."""
+        """Result of the search: the trim, its accelerations, and the target of the last step, in order of `free`."""
         low, high, most = np.array([BOUNDS[name] for name in self.free]).T
         x = np.clip([getattr(guess, name) for name in self.free], low, high)
         f = self.remaining(self.at(guess, x))
@@ -198,7 +197,7 @@ class Search:
             f_new = self.remaining(self.at(guess, x_new))
             taken, better = (x_new - x) / most, np.linalg.norm(f_new) < 0.5 * np.linalg.norm(f)
             stuck = 0 if np.max(np.abs(taken)) > 1e-3 or better else stuck + 1
-            # Broyden: the least change of the Jacobian that explains this step.
+            # Broyden: the smallest change of the Jacobian consistent with this step.
             if better:
                 J = J + np.outer(f_new - f - J @ (x_new - x), taken / most) / max(float(taken @ taken), 1e-300)
             x, f, fresh = x_new, f_new, bool(better)
@@ -206,7 +205,7 @@ class Search:
 
 
 def _newton(J: Array, f: Array) -> Array:
-    """The step to where the linear model vanishes; the shortest that comes nearest where there is none."""
+    """The Newton step; the shortest least-squares step if the Jacobian is singular."""
     try:
         return np.asarray(np.linalg.solve(J, -f), np.float64)
     except np.linalg.LinAlgError:
@@ -218,24 +217,23 @@ def trim(
     throttle: float | None = None, bank_rad: float = 0.0, heading_rad: float = 0.0,
     wind_e_m_s: Sequence[float] = STILL.wind_e_m_s, guess: Trim | None = None,
 ) -> Trim:  # fmt: skip
-    """Find the steady flight at `airspeed_m_s`: level, or without a motor gliding, unless told otherwise.
+    """Find the steady flight at `airspeed_m_s`; by default level, or gliding without a motor.
 
     Parameters
     ----------
     model : the aeroplane               airspeed_m_s, height_m : through the air, above the ground
-    climb_rad : angle of the path through the air; the throttle is found
-    throttle : 0..1, 0 is a glide; the angle of the path is found
-    bank_rad : of a steady turn, + to the right; 0 is straight flight, with the trace of bank that holds against
-        the turning of the earth
-    heading_rad, wind_e_m_s : of the nose, and where the air goes to: they matter through the turning earth alone
-    guess : a trim near by, to start from
+    climb_rad : climb angle through the air; the throttle is found
+    throttle : 0..1, 0 is a glide; the climb angle is found
+    bank_rad : of a steady turn, + to the right; 0 is straight flight, with the tiny bank due to the earth's rotation
+    heading_rad, wind_e_m_s : of the nose and of the air; they matter only through the earth's rotation
+    guess : a trim nearby, to start from
 
-    The sideslip is zero.  An aeroplane without ailerons turns and holds its wings by sideslip and dihedral: there
-    the sideslip is found in the place of the aileron.
+    The sideslip is zero.  An aeroplane without ailerons is controlled in roll by sideslip and dihedral: for it the
+    sideslip is found instead of the aileron.
 
     Raises
     ------
-    ValueError    there is no such flight; the line names what cannot be met
+    ValueError    there is no such flight; the message says why
     """
     if climb_rad is not None and throttle is not None:
         raise ValueError(f"climb_rad {climb_rad} and throttle {throttle}: give one, the other follows from it")
@@ -264,25 +262,25 @@ def trim(
 
 
 def _path(climb_rad: float, throttle: float | None) -> str:
-    """The word for what was asked."""
+    """The kind of flight, in a word."""
     if throttle is None:
         return "level" if climb_rad == 0.0 else "climbing" if climb_rad > 0.0 else "descending"
     return "gliding" if throttle == 0.0 else "powered"
 
 
 def _power(search: Search, start: Trim) -> str:
-    """What the throttle cannot do: the path asked for against those with the motor off and at its most."""
+    """Why no throttle gives the climb angle: it is compared with those at full throttle and motor off."""
     along = replace(search, free=tuple("climb_rad" if name == "throttle" else name for name in search.free))
     for throttle, sign, stop in ((1.0, 1.0, "full throttle"), (0.0, -1.0, "the motor off")):
         t, left, _ = along.run(replace(start, throttle=throttle))
         if np.max(np.abs(left)) < 1e-9 and sign * (start.climb_rad - t.climb_rad) > 0.0:
-            asked, has = math.degrees(start.climb_rad), math.degrees(t.climb_rad)
-            return f"the throttle has to go beyond {throttle:g}: the path is {has:.1f} deg with {stop}, not {asked:.1f}"
+            wanted, found = math.degrees(start.climb_rad), math.degrees(t.climb_rad)
+            return f"the throttle would exceed {throttle:g}: the path is {found:.1f} deg with {stop}, not {wanted:.1f}"
     return ""
 
 
 def surfaces(model: "Model") -> tuple[str, str, str]:
-    """What holds roll, pitch and yaw: aileron, elevator, rudder, or sideslip where the aileron moves nothing."""
+    """Unknowns for roll, pitch and yaw: aileron, elevator, rudder; sideslip if the aileron has no effect."""
     t = Trim.of(model.airframe["cruise"])
     deflected = accelerations(model, replace(t, aileron=0.5), 60.0) - accelerations(model, t, 60.0)
     return "aileron" if abs(deflected[3]) > 1e-6 else "beta_rad", "elevator", "rudder"
@@ -291,7 +289,7 @@ def surfaces(model: "Model") -> tuple[str, str, str]:
 def _check(
     model: "Model", airspeed_m_s: float, climb_rad: float | None, throttle: float | None, bank_rad: float
 ) -> None:
-    """Refuse what no search could answer."""
+    """Reject invalid arguments of `trim`: ValueError."""
     low, high, _ = BOUNDS["airspeed_m_s"]
     if not low <= airspeed_m_s <= high:
         raise ValueError(f"airspeed_m_s {airspeed_m_s} m/s: choose {low:g} to {high:g} m/s")
@@ -302,12 +300,12 @@ def _check(
     if not abs(bank_rad) <= 1.4:
         raise ValueError(f"bank_rad {bank_rad} rad: choose -1.4 to 1.4")
     if not model.powered and throttle != 0.0:
-        asked = f"climb_rad {climb_rad}" if throttle is None else f"throttle {throttle}"
-        raise ValueError(f"{asked}: '{model.folder.name}' has no motor, ask for throttle 0 and take the glide it has")
+        given = f"climb_rad {climb_rad}" if throttle is None else f"throttle {throttle}"
+        raise ValueError(f"{given}: '{model.folder.name}' has no motor, choose throttle 0 for a glide")
 
 
 def _guess(model: "Model", airspeed_m_s: float, bank_rad: float) -> Trim:
-    """The cruise at another speed: the angle of attack above that of no lift goes with load / V^2, roughly."""
+    """The cruise at another speed: angle of attack above zero lift roughly proportional to load / V^2."""
     cruise = Trim.of(model.airframe["cruise"])
     load = 1.0 / math.cos(bank_rad)
     alpha_rad = cruise.alpha_rad + 0.07 * (load * (cruise.airspeed_m_s / airspeed_m_s) ** 2 - 1.0)
@@ -316,7 +314,7 @@ def _guess(model: "Model", airspeed_m_s: float, bank_rad: float) -> Trim:
 
 
 def _problem(search: Search, t: Trim, left: Array, wanted: Array) -> str:
-    """Why `t` is no flight that can be held; empty where it is one."""
+    """Why `t` is not a steady flight; empty if it is."""
     solved = bool(np.max(np.abs(left)) < 1e-9)
     if solved and lift_slope(search.model, t, search.height_m) > 0.0:
         return ""

@@ -1,8 +1,8 @@
-"""The air that the aeroplane flies through: wind that grows with height, gusts, turbulence and thermals.
+"""The air: mean wind with shear, gusts, turbulence and thermals.
 
-``profile``  the mean wind with height        ``gust``     discrete 1-cosine gusts
+``profile``  mean wind over height            ``gust``     discrete 1-cosine gusts
 ``dryden``   turbulence                       ``thermal``  updrafts and the sink between them
-``air``      all of it added up, once a tick
+``air``      their sum, once per tick
 
 Heights are above the ground, which is flat and at the height of the launch point.
 """

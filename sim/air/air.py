@@ -1,4 +1,4 @@
-"""All that moves the air, added up at the place of the aeroplane once a tick."""
+"""The sum of all air motion at the aeroplane, once per tick."""
 
 import math
 from dataclasses import dataclass, field
@@ -22,10 +22,10 @@ AIR_DTYPE = np.dtype(
         ("thermal_m_s", "f8"),
         ("inversion_m", "f8"),
         ("thermal_area_m2", "f8"),
-        ("p_e_m", "f8", (3,)),  # where the aeroplane is
+        ("p_e_m", "f8", (3,)),  # of the aeroplane
         ("airspeed_m_s", "f8"),
         *dryden.FIELDS,
-        ("now", "f8", (6,)),  # what blows there: wind_e_m_s, and the rates of the air rate_b_rad_s
+        ("now", "f8", (6,)),  # wind_e_m_s there, and rates of the air, rate_b_rad_s
     ],
     align=True,
 )
@@ -33,12 +33,12 @@ AIR_DTYPE = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class Air:
-    """A mean wind with all that rides on it.
+    """Mean wind, shear, turbulence, gusts and thermals.
 
-    wind_e_m_s : (north, east, down)   velocity of the air over the ground, where it blows to, at 10 m
-    turbulence_w20_m_s : float         the wind at 20 ft that sets the strength of low-altitude turbulence, 0 is none;
-                                       the standard calls 7.7 light, 15.4 moderate, 23.2 severe (`sim.air.dryden`)
-    shear : float                      exponent of the wind's growth with height (`sim.air.profile`), 0 is none
+    wind_e_m_s : (north, east, down)   velocity of the air over the ground at 10 m: the direction it blows to
+    turbulence_w20_m_s : float         wind at 20 ft that sets the strength of low-altitude turbulence, 0: none;
+                                       7.7 is light, 15.4 moderate, 23.2 severe in the standard (`sim.air.dryden`)
+    shear : float                      exponent of the wind profile over height (`sim.air.profile`), 0: none
     gusts, thermals                    see `sim.air.gust`, `sim.air.thermal`
     """
 
@@ -58,7 +58,7 @@ class Air:
 
     @property
     def is_steady(self) -> bool:
-        """Whether it blows the same everywhere and always."""
+        """Whether the wind is the same everywhere and at all times."""
         sheared = self.shear > 0.0 and any(self.wind_e_m_s)
         return not (sheared or self.gusts or self.turbulence_w20_m_s or self.thermals.places_e_m)
 
@@ -76,12 +76,12 @@ class MovingAir:
 
     Parameters
     ----------
-    air : what blows
+    air : its parameters
     span_m : of the aeroplane, over which turbulence is averaged for its rates
-    dt_s : tick          release_s : since power-up, from which the times of gusts count
-    seed, flight : which random streams: turbulence u, v (r with it), w (q with it), and p
+    dt_s : tick          release_s : since power-up; gust times count from it
+    seed, flight : of the random streams: turbulence u, v (and r), w (and q), p
 
-    Gusts, thermals and shear draw no numbers: with or without them the turbulence is the same.
+    Gusts, thermals and shear draw no random numbers and leave the turbulence unchanged.
     """
 
     def __init__(self, air: Air, span_m: float, dt_s: float, release_s: float, seed: int, flight: int = 0) -> None:
@@ -102,7 +102,7 @@ class MovingAir:
 
     @property
     def now(self) -> list[float]:
-        """What blows at the aeroplane: wind north, east, down [m/s], rates p, q, r [rad/s]."""
+        """At the aeroplane: wind north, east, down [m/s], rates p, q, r [rad/s]."""
         return self._now.tolist()
 
     @property
@@ -111,13 +111,13 @@ class MovingAir:
         return self._now[:3].copy()
 
     def start(self, n_ticks: int, p_e_m: tuple[float, float, float]) -> None:
-        """Begin a flight of at most `n_ticks` at `p_e_m`, at power-up; the turbulence is stationary at once."""
+        """Begin a flight of at most `n_ticks` at `p_e_m`, at power-up; the turbulence is stationary from the start."""
         s = self.state[0]
         s["p_e_m"], s["airspeed_m_s"] = p_e_m, 0.0
         if self.air.is_steady:
             self._now[:3] = self.air.wind_e_m_s
             return
-        # Row 0 for the start; row k does not depend on the number of rows.
+        # Row 0 is for the start; row k does not depend on the number of rows.
         self._noise = np.hstack(
             [
                 stream(self._seed, self._flight, name).standard_normal((n_ticks + 1, width))

@@ -13,15 +13,15 @@ with b the span, and from 10 ft to 1000 ft (3 m to 305 m) above the ground, h in
     L_w = h          L_u = L_v = h / (0.177 + 0.000823 h)^1.2
     sigma_w = 0.1 W20          sigma_u = sigma_v = sigma_w / (0.177 + 0.000823 h)^0.4
 
-Below and above, the values at these bounds are held.  The handbook writes twice its own L_v and L_w and so comes to
-the same spectra.  u is along the mean wind, w vertical.  q follows from w and r from v, q = -dw/dx and r = dv/dx
-averaged over the aeroplane, so that a nose that flies into rising air feels the air turn it up; p, q and r are
-about the axes of the aeroplane, and r is in phase with v for flight down the wind.
+Below and above, the values at these bounds are used.  The handbook defines L_v and L_w as half of these and gives the
+same spectra.  u is along the mean wind, w vertical.  q follows from w and r from v, q = -dw/dx and r = dv/dx averaged
+over the aeroplane, so that flying into rising air pitches it up; p, q and r are about the axes of the aeroplane, and r
+is in phase with v for flight downwind.
 
-Everything is a linear filter of white noise over the distance flown through air that stands still (Taylor), not
-over time.  A step of any length is taken exactly: states x <- Phi x + C z with the matrix exponential Phi, the
-covariance C C^T of what the noise adds on the way (Van Loan, 1978), and unit normal z.  So the statistics do not
-depend on the length of a tick, and at rest in still air the turbulence stands still.
+All are linear filters of white noise over the distance flown through frozen air (Taylor), not over time.  Steps of any
+length are exact: x <- Phi x + C z with the matrix exponential Phi, the covariance C C^T of the noise over the step
+(Van Loan, 1978), and unit normal z.  So the statistics do not depend on the tick length, and for an aeroplane at rest
+in still air the turbulence is constant.
 """
 
 import math
@@ -72,20 +72,20 @@ def strengths(height_m, w20_m_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def sigma_p_rad_s(sigma_w, scale_w, span_m):  # type: ignore[no-untyped-def]
-    """Standard deviation of the rolling of the air: root of the integral of Phi_p."""
+    """Standard deviation of the roll rate of the air: root of the integral of Phi_p."""
     variance = 0.8 * (np.pi * scale_w / (4.0 * span_m)) ** (1.0 / 3.0) * np.pi**2 / (8.0 * span_m * scale_w)
     return sigma_w * np.sqrt(variance)
 
 
 @kernel
 def transition(distance_m, scale_m, averaged_m, s):  # type: ignore[no-untyped-def]
-    """Write ``s.phi`` and ``s.spread`` of a step of the states (x1, x2, m), from which v and r (or w and q) follow.
+    """Write ``s.phi`` and ``s.spread`` of a step of the states (x1, x2, m), which give v and r (or w and q).
 
         dx1 = -x1 / L dx + dW / sqrt(L)     dx2 = (x1 - x2) / L dx     dm = (v - m) / l dx
         v = sqrt(3) x1 + (1 - sqrt(3)) x2          filtered derivative of v: (v - m) / l
 
     L : scale_m          l : averaged_m, 4 b / pi or 3 b / pi
-    Taylor series of the exponential and of the covariance over a part of the step, then doubled to the whole.
+    Taylor series of the exponential and of the covariance over a fraction of the step, doubled up to the whole.
     """
     a, b = distance_m / scale_m, distance_m / averaged_m
     doublings = 0
@@ -142,7 +142,7 @@ def _double(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def wander(x, z, s):  # type: ignore[no-untyped-def]
-    """x <- phi x + C z with C the Cholesky factor of the spread; nought where the step has no length."""
+    """x <- phi x + C z with C the Cholesky factor of the spread; zero for a step of zero length."""
     phi, q = s.phi, s.spread
     c00 = np.sqrt(q[0, 0])
     c10 = q[1, 0] / c00 if c00 > 0.0 else 0.0
@@ -158,13 +158,13 @@ def wander(x, z, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def wander_alone(x, z, lengths):  # type: ignore[no-untyped-def]
-    """The same for one state of a first-order filter, over `lengths` of its scale."""
+    """As `wander`, for one state of a first-order filter, over `lengths` of its scale."""
     return np.exp(-lengths) * x + np.sqrt(-np.expm1(-2.0 * lengths)) * z
 
 
 @kernel
 def add_turbulence(distance_m, height_m, z, s, wind_e, rate_b):  # type: ignore[no-untyped-def]
-    """Fly on by `distance_m`; add the turbulence to `wind_e` and write its rates into `rate_b`, both shape (3,).
+    """Advance by `distance_m`; add the turbulence to `wind_e` and write its rates into `rate_b`, both shape (3,).
 
     z : shape (8,), unit normal, in the order of STREAMS          s : record with the FIELDS
     """

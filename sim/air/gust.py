@@ -1,11 +1,10 @@
 """Discrete gusts of the 1-cosine shape (MIL-F-8785C, section 3.7).
 
-The standard's gust rises to its peak as (1 - cos) / 2; two of them, the second the other way, make the whole wave
-that is flown here (as in 14 CFR 25.341):
+The gust of the standard rises to its peak as (1 - cos) / 2; here it also falls the same way (as in 14 CFR 25.341):
 
     V(t) = V_peak / 2 (1 - cos(2 pi (t - t_start) / T))     for t_start <= t <= t_start + T, else 0
 
-T V / 2 of an aeroplane of airspeed V is the standard's gust length d_m.
+At the airspeed V the gust length d_m of the standard is T V / 2.
 """
 
 import math
@@ -20,7 +19,7 @@ STRONGEST_M_S = 30.0
 class Gust:
     """One gust.
 
-    peak_e_m_s : (north, east, down)   velocity of the air over the ground that it adds at its peak
+    peak_e_m_s : (north, east, down)   velocity of the air added at the peak
     start_s : since the release        length_s : from calm to calm, > 0
     """
 
@@ -41,8 +40,7 @@ class Gust:
 
 @kernel
 def add_gusts(t_s, gusts, wind_e):  # type: ignore[no-untyped-def]
-    """Add to `wind_e`, shape (3,), what blows at `t_s` since the release; `gusts` as
-    `MovingAir` lays them out: peak (3), begin, length."""
+    """Add the gusts at `t_s` since the release to `wind_e`, shape (3,); rows of `gusts`: peak (3), start, length."""
     for i in range(gusts.shape[0]):
         part = (t_s - gusts[i, 3]) / gusts[i, 4]
         if 0.0 < part < 1.0:

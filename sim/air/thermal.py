@@ -1,13 +1,13 @@
 """Thermals: the updraft model of Allen, NASA/TM-2006-214019 ("Updraft Model for Development of Autonomous Soaring
 Uninhabited Air Vehicles", 2006), equations 11 to 23.
 
-A column of rising air over each place, stronger and wider with height up to the inversion, and between the columns
-the sink that brings down as much air as they take up.  The nearest column governs; they stand where they are.
+Each thermal is a fixed column of rising air, stronger and wider with height up to the inversion; the sink between
+the columns balances their mass flow.  The nearest column determines the updraft.
 
-Two of the report's prints contradict the code in its appendix, with which its figures were made, and the trapezoid
-that the shape is fitted to; the code is followed: the shape is k1 |r / r2 + k3| to the power of k2, and k4 is the
-column of -0.195 to -0.0033.  Where the code would step (from one row of constants to the next, and at r1 where the
-sink sets in) this one is continuous: constants are interpolated, and the sink is blended in from the centre.
+In two places the printed equations contradict the code in the appendix, which produced the report's figures and fits
+its trapezoid; this follows the code: the shape is k1 |r / r2 + k3| to the power of k2, and k4 is the column of -0.195
+to -0.0033.  Steps in that code (between rows of constants, and at r1 where the sink begins) are smoothed: constants
+are interpolated and the sink is blended in from the centre.
 """
 
 import math
@@ -17,7 +17,7 @@ import numpy as np
 
 from estimator.compiler.jit import kernel
 
-MOST = 20  # thermals at once
+MOST = 20  # thermals in one flight
 # Shape constants by r1 / r2: k1, k2, k3, k4 (appendix B).
 RATIOS = np.array([0.14, 0.25, 0.36, 0.47, 0.58, 0.69, 0.80])
 SHAPES = np.array(
@@ -31,7 +31,7 @@ SHAPES = np.array(
         [0.6189, 42.7965, 0.7157, -0.0033],
     ]
 )
-SPACING_HEIGHT = 0.4  # of the inversion: where the report counts the thermals of an area
+SPACING_HEIGHT = 0.4  # of the inversion: at which the report counts thermals per area
 WIDEST = 0.0765  # largest outer radius over the inversion height: 0.102 x^(1/3) (1 - x / 4), at x = 1
 
 
@@ -40,7 +40,7 @@ class Thermals:
     """The thermals of one flight.
 
     places_e_m : (north, east) of each column from the launch point
-    strength_m_s : the convective velocity scale w*; monthly means of the report: 1.3 m/s in December, 2.7 in July
+    strength_m_s : the convective velocity scale w*; monthly means 1.3 m/s in December, 2.7 in July
     inversion_m : height of the inversion z_i above the ground; 440 m in December, 1975 m in July
     """
 
@@ -58,17 +58,17 @@ class Thermals:
 
     @property
     def area_m2(self) -> float:
-        """Ground over which the air balances."""
+        """Ground area over which the mass flow balances."""
         return area_of(len(self.places_e_m), self.inversion_m)
 
 
 def area_of(number: int, inversion_m: float) -> float:
-    """Ground that belongs to `number` thermals [m2]: N = 0.6 X Y / (z_i r2) (equation 20)."""
+    """Ground area of `number` thermals [m2]: N = 0.6 X Y / (z_i r2) (equation 20)."""
     return number * inversion_m * float(radius_m(SPACING_HEIGHT * inversion_m, inversion_m)) / 0.6
 
 
 def place(number: int, inversion_m: float, rng: np.random.Generator) -> tuple[tuple[float, float], ...]:
-    """Places (north, east) of `number` thermals: anywhere in a square around the launch point, none in another."""
+    """Positions (north, east) of `number` thermals, uniform in a square around the launch point, not overlapping."""
     half_m = 0.5 * math.sqrt(area_of(number, inversion_m))
     places: list[tuple[float, float]] = []
     while len(places) < number:
@@ -87,7 +87,7 @@ def radius_m(height_m, inversion_m):  # type: ignore[no-untyped-def]
 
 @kernel
 def mean_updraft_m_s(height_m, inversion_m, strength_m_s):  # type: ignore[no-untyped-def]
-    """Mean velocity of the rising air within r2 (equation 11), nought from 10/11 of the inversion upwards."""
+    """Mean velocity of the rising air within r2 (equation 11), zero from 10/11 of the inversion upwards."""
     x = height_m / inversion_m
     return max(0.0, strength_m_s * x ** (1.0 / 3.0) * (1.0 - 1.1 * x))
 
@@ -96,7 +96,7 @@ def mean_updraft_m_s(height_m, inversion_m, strength_m_s):  # type: ignore[no-un
 def bell(r, ratio):  # type: ignore[no-untyped-def]
     """Updraft at `r` outer radii over that at the centre, for r1 / r2 = `ratio` (equation 16)."""
     last = RATIOS.shape[0] - 2
-    at = min(max((ratio - RATIOS[0]) / (RATIOS[1] - RATIOS[0]), 0.0), last + 1.0)  # the ratios are evenly spaced
+    at = min(max((ratio - RATIOS[0]) / (RATIOS[1] - RATIOS[0]), 0.0), last + 1.0)  # evenly spaced
     i = min(int(at), last)
     part = at - i
     k1 = (1.0 - part) * SHAPES[i, 0] + part * SHAPES[i + 1, 0]
@@ -108,7 +108,7 @@ def bell(r, ratio):  # type: ignore[no-untyped-def]
 
 @kernel
 def updraft_m_s(north_m, east_m, height_m, places, strength_m_s, inversion_m, area_m2):  # type: ignore[no-untyped-def]
-    """Velocity of the air upwards; `places` has a row (north, east) for each thermal."""
+    """Upward velocity of the air; `places` has a row (north, east) per thermal."""
     mean = mean_updraft_m_s(max(height_m, 0.0), inversion_m, strength_m_s)
     if mean == 0.0 or places.shape[0] == 0:
         return 0.0
@@ -119,7 +119,7 @@ def updraft_m_s(north_m, east_m, height_m, places, strength_m_s, inversion_m, ar
     ratio = min(0.0011 * r2 + 0.14, 0.8)  # equation 13
     peak = 3.0 * mean * (1.0 - ratio) / (1.0 - ratio**3)  # so that the trapezoid's mean is `mean`
     r = np.sqrt(nearest2) / r2
-    edge_share = 2.5 * (x - 0.5) if 0.5 < x <= 0.9 else 0.0  # of the sink that falls around the column, equation 18
+    edge_share = 2.5 * (x - 0.5) if 0.5 < x <= 0.9 else 0.0  # share of the sink around the column, equation 18
     edge = edge_share * min(0.0, np.pi / 6.0 * np.sin(np.pi * r)) if ratio < r < 2.0 else 0.0  # equation 17
     columns_m2 = places.shape[0] * np.pi * r2 * r2
     sink = -columns_m2 * mean * (1.0 - edge_share) / (area_m2 - columns_m2)  # equation 21

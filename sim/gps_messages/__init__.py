@@ -1,12 +1,12 @@
-"""GPS fixes as a receiver sends them: NMEA 0183 sentences and UBX NAV-PVT messages, written and read.
+"""GPS fixes as receiver messages, written and read: NMEA 0183 sentences and UBX NAV-PVT.
 
-``fixes.py``   the plain structure of fixes, the place and the date it hangs from, and what is wrong with a file
+``fixes.py``   the structure of fixes, its origin in place and time, and the problems of a file
 ``nmea.py``    GGA, RMC and VTG, by pynmeagps
 ``ubx.py``     NAV-PVT, by pyubx2
 
-What is written comes back within half a unit of the last digit that the format carries, and what was read is written
-back as the same bytes.  Files of other receivers are read too: every sentence that had to be dropped or repaired is
-told with its place in the file.
+Written fixes are read back within half a unit of the last digit of the format, and fixes that were read are written as
+the same bytes.  Files of other receivers can be read; each sentence that was dropped or repaired is reported with its
+place in the file.
 """
 
 from sim.gps_messages.fixes import LAUNCH, START, Accuracy, Fixes, Place, Problem, Reading

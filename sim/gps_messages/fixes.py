@@ -1,11 +1,11 @@
-"""GPS fixes as a plain structure, the place and the date it hangs from, and what is wrong with a file of them.
+"""The structure of GPS fixes, its origin in place and time, and the problems found in a file.
 
-Times are kept as whole nanoseconds of UTC while they are written and read, so that no digit is lost in a float.
-The simulated sea is the WGS 84 ellipsoid: height above the one is height above the other.
+Times are integer nanoseconds of UTC while writing and reading, so that no digits are lost.  The simulated sea is the
+WGS 84 ellipsoid: heights above both are equal.
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from importlib import import_module
@@ -17,6 +17,7 @@ import pymap3d
 from numpy.typing import NDArray
 
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG, YEAR
+from sim.recording import replacing
 
 Array = NDArray[np.float64]
 NAN: Final = float("nan")
@@ -35,14 +36,14 @@ class Place(NamedTuple):
 LAUNCH: Final = Place(LATITUDE_DEG, LONGITUDE_DEG, ELEVATION_M)
 _NEW_YEAR: Final = datetime(int(YEAR), 1, 1, tzinfo=UTC)
 START: Final = _NEW_YEAR + YEAR % 1.0 * (datetime(int(YEAR) + 1, 1, 1, tzinfo=UTC) - _NEW_YEAR)
-"""When the power came up, unless told otherwise: fixed, so that the same flight gives the same file."""
+"""Default time of power-up: fixed, so that the same flight gives the same file."""
 
 SATELLITES: Final = 12
-"""Satellites that a written fix names: none are simulated, and readers refuse a fix that has too few."""
+"""Number of satellites in written fixes: none are simulated, but readers reject fixes with too few."""
 
 
 class Accuracy(NamedTuple):
-    """One sigma of what a receiver reports, as far as it is known: horizontal (both axes), vertical, speed."""
+    """One sigma of a receiver, NaN if unknown: horizontal (both axes), vertical, speed."""
 
     horizontal_m: float = NAN
     vertical_m: float = NAN
@@ -51,14 +52,14 @@ class Accuracy(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Fixes:
-    """Fixes in the order in which they arrived, NaN where something is not known.
+    """Fixes in order of arrival, NaN for unknown values.
 
-    t_s : shape (n,)            when the fix was true, the receiver's stamp
-    arrival_s : shape (n,)      when it arrived; no message carries that
+    t_s : shape (n,)            validity time, the receiver's stamp
+    arrival_s : shape (n,)      time of arrival; not part of any message
     p_e_m, v_e_m_s : shape (n, 3)   north, east, down
-    course_rad, speed_m_s : shape (n,)   over ground, from north over east; horizontal
+    course_rad, speed_m_s : shape (n,)   over ground, clockwise from north; horizontal
     horizontal_acc_m, vertical_acc_m, speed_acc_m_s, course_acc_rad : shape (n,)   the receiver's own estimates
-    satellites : shape (n,)     how many it used
+    satellites : shape (n,)     number used
     """
 
     t_s: Array
@@ -80,9 +81,8 @@ class Fixes:
     def from_log(cls, measured: NDArray[Any], accuracy: Accuracy = Accuracy()) -> "Fixes":  # noqa: B008 - immutable
         """The fixes that arrived in the rows `measured` of a log, from a receiver of known `accuracy`.
 
-        The uncertainty of the course is that of the speed across the track, over the speed.  A fix of a receiver that
-        did not say when it was true, as in many recorded logs, has the time of its arrival: a message without one says
-        that there is no fix.
+        The uncertainty of the course is that of the cross-track speed over the speed.  A fix without time stamp, as in
+        many recorded logs, gets its time of arrival: a message without time would mean no fix.
         """
         rows = measured[measured["gps_new"] == 1]
         n = len(rows)
@@ -102,21 +102,21 @@ class Fixes:
 
 
 Kind = Literal[
-    "checksum",  # a message that was damaged on its way: dropped
-    "malformed",  # one that no receiver sends: dropped
+    "checksum",  # damaged message: dropped
+    "malformed",  # invalid message: dropped
     "truncated",  # the end of the file is missing
-    "no time",  # a message that does not say when it was true: dropped
-    "no fix",  # the receiver says that it had none: dropped
-    "repeated",  # a message for a time that has one already: dropped
-    "out of order",  # a fix older than one before it: put where it belongs
+    "no time",  # message without time: dropped
+    "no fix",  # the receiver had none: dropped
+    "repeated",  # second message for the same time: dropped
+    "out of order",  # fix older than one before it: sorted
     "no height",  # kept, down is NaN
     "no speed",  # kept, course, speed and velocity are NaN
-    "no course",  # kept, course is NaN, and the velocity too unless it is zero
+    "no course",  # kept, course is NaN, and so is the velocity unless zero
 ]
 
 
 class Problem(NamedTuple):
-    """Something that was dropped, repaired or missing, and where in the file."""
+    """A message dropped, repaired or incomplete, and its place in the file."""
 
     kind: Kind
     where: str
@@ -128,10 +128,10 @@ class Problem(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a file held: its fixes in the order of their times, and what was wrong with it.
+    """Contents of a file: its fixes in order of time, and its problems.
 
-    place, start : origin and zero of time of `fixes`, those asked for, or those of the first fix
-    ignored : messages that say nothing of a fix        problems : all others that were not simply taken
+    place, start : origin and zero of time of `fixes`, as given or of the first fix
+    ignored : number of other messages        problems : of messages about fixes
     """
 
     fixes: Fixes
@@ -141,13 +141,13 @@ class Reading:
     problems: tuple[Problem, ...]
 
     def count(self, kind: Kind) -> int:
-        """How many problems of that kind."""
+        """Number of problems of that kind."""
         return sum(problem.kind == kind for problem in self.problems)
 
 
 @dataclass(slots=True)
 class Epoch:
-    """One fix while it is put together from its messages."""
+    """One fix under construction from its messages."""
 
     where: str
     latitude_deg: float = NAN
@@ -163,7 +163,7 @@ class Epoch:
 
 
 def needed(package: str) -> Any:
-    """The optional `package`; ValueError with what to install where it is missing."""
+    """The optional `package`; ValueError with what to install if it is missing."""
     try:
         return import_module(package)
     except ImportError as error:
@@ -171,21 +171,21 @@ def needed(package: str) -> Any:
 
 
 def utc_ns(start: datetime) -> int:
-    """Nanoseconds of UTC since 1970 at `start`; ValueError where its zone is not said."""
+    """Nanoseconds of UTC since 1970 at `start`; ValueError if it has no time zone."""
     if start.tzinfo is None:
-        raise ValueError(f"start = {start.isoformat()}: say its time zone, for instance {start.isoformat()}Z")
+        raise ValueError(f"start = {start.isoformat()}: add a time zone, for instance {start.isoformat()}Z")
     return (start - EPOCH) // timedelta(microseconds=1) * 1000
 
 
 def stamps_ns(fixes: Fixes, start: datetime) -> list[int | None]:
-    """UTC of every fix, None where it has no time; ValueError where NMEA's two-digit year could not say it."""
+    """UTC of each fix, None if it has no time; ValueError if outside the two-digit years of NMEA."""
     zero = utc_ns(start)
     stamps = [zero + round(t * NS) if np.isfinite(t) else None for t in fixes.t_s.tolist()]
     known = [stamp for stamp in stamps if stamp is not None]
     if known and (min(known) < _FIRST_NS or max(known) >= _END_NS):
         raise ValueError(
             f"start = {start.isoformat()}, with t_s of {np.nanmin(fixes.t_s):g} to {np.nanmax(fixes.t_s):g} s: "
-            "must lie between 6 January 1980, where GPS begins, and the end of 2068, where two-digit years do"
+            "must be between 6 January 1980, the start of GPS, and the end of 2068, that of two-digit years"
         )
     return stamps
 
@@ -195,12 +195,12 @@ _END_NS: Final = utc_ns(datetime(2069, 1, 1, tzinfo=UTC))
 
 
 def date_time(ns: int) -> datetime:
-    """UTC as a date and a time, to the microsecond below."""
+    """UTC as date and time, rounded down to a microsecond."""
     return EPOCH + timedelta(microseconds=ns // 1000)
 
 
 def checked(place: Place) -> Place:
-    """`place`; ValueError where there is none such."""
+    """`place`; ValueError if it is invalid."""
     if not (abs(place.latitude_deg) <= 90.0 and abs(place.longitude_deg) <= 180.0 and np.isfinite(place.height_m)):
         raise ValueError(f"{place}: latitude must be -90..90 deg, longitude -180..180 deg, height a number of metres")
     return place
@@ -209,7 +209,7 @@ def checked(place: Place) -> Place:
 def geodetic(p_e_m: Array, place: Place) -> Array:
     """Latitude, longitude (deg) and height (m) of positions of shape (n, 3).
 
-    Without down, NaN, the height is NaN and the rest is that of the place's own level; without north or east all are.
+    If down is NaN, so is the height, and the rest is computed at the level of the place; if north or east is, all are.
     """
     there = np.full_like(p_e_m, NAN)
     known = np.isfinite(p_e_m[:, :2]).all(axis=1)
@@ -223,22 +223,34 @@ def geodetic(p_e_m: Array, place: Place) -> Array:
     return there
 
 
-def read(file: str | Path) -> bytes:
-    """All of `file`; ValueError where it cannot be read."""
+def read(
+    file: str | Path, decode: Callable[[bytes, Place | None, datetime | None], Reading], place: Place | None,
+    start: datetime | None,
+) -> Reading:  # fmt: skip
+    """`decode` the contents of `file`; ValueError, with its name, if it cannot be read or has no fix."""
     try:
-        return Path(file).read_bytes()
+        return decode(Path(file).read_bytes(), place, start)
     except OSError as error:
         raise ValueError(f"cannot read {file}: {error.strerror}") from error
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+
+
+def write(file: str | Path, data: bytes) -> Path:
+    """Write `data` to `file`, complete or not at all, and return its path."""
+    with replacing(Path(file)) as temporary:
+        temporary.write_bytes(data)
+    return Path(file)
 
 
 def assemble(
     epochs: dict[int, Epoch], problems: list[Problem], ignored: int, place: Place | None, start: datetime | None
 ) -> Reading:
-    """Fixes of the `epochs` (by their nanosecond of UTC, in the order of the file), those without a fix dropped.
+    """Fixes of the `epochs` (by nanosecond of UTC, in order of the file), dropping those without a fix.
 
     Raises
     ------
-    ValueError      no fix at all, with what was found instead
+    ValueError      no fix at all; the message lists what was found
     """
     latest = None
     kept = {}
@@ -252,7 +264,7 @@ def assemble(
         latest = ns if latest is None else max(ns, latest)
         problems += _gaps(epoch)
     if not kept:
-        raise ValueError(f"no GPS fix in it{_told(problems, ignored)}")
+        raise ValueError(f"no GPS fix in it{_found(problems, ignored)}")
     times = sorted(kept)
     ordered = [kept[ns] for ns in times]
     place = _place(ordered) if place is None else checked(place)
@@ -262,23 +274,23 @@ def assemble(
 
 def _gaps(epoch: Epoch) -> Iterable[Problem]:
     if not np.isfinite(epoch.height_m):
-        yield Problem("no height", epoch.where, "down is not known")
+        yield Problem("no height", epoch.where, "down is unknown")
     if not np.isfinite(epoch.speed_m_s):
-        yield Problem("no speed", epoch.where, "velocity is not known")
+        yield Problem("no speed", epoch.where, "velocity is unknown")
     elif not np.isfinite(epoch.course_deg):
         yield Problem("no course", epoch.where, "only the speed is known")
 
 
-def _told(problems: list[Problem], ignored: int) -> str:
+def _found(problems: list[Problem], ignored: int) -> str:
     counts = Counter(str(problem.kind) for problem in problems)
     if ignored:
         counts["other messages"] = ignored
     found = ", ".join(f"{kind} {n}" for kind, n in counts.items())
-    return f" (found: {found})" if found else ": neither a sentence nor a message was found"
+    return f" (found: {found})" if found else ": no sentences or messages found"
 
 
 def _place(ordered: list[Epoch]) -> Place:
-    """Where the first fix was; at its height, or that of the first which has one."""
+    """Position of the first fix, at the first known height."""
     height_m = next((e.height_m for e in ordered if np.isfinite(e.height_m)), 0.0)
     return Place(ordered[0].latitude_deg, ordered[0].longitude_deg, height_m)
 
@@ -303,9 +315,6 @@ def _fixes(times: list[int], ordered: list[Epoch], place: Place, zero_ns: int) -
         v_e_m_s=np.array([e.v_e_m_s for e in ordered]),
         course_rad=np.radians([e.course_deg for e in ordered]),
         speed_m_s=np.array([e.speed_m_s for e in ordered]),
-        horizontal_acc_m=horizontal,
-        vertical_acc_m=vertical,
-        speed_acc_m_s=speed,
-        course_acc_rad=np.radians(course),
+        horizontal_acc_m=horizontal, vertical_acc_m=vertical, speed_acc_m_s=speed, course_acc_rad=np.radians(course),
         satellites=np.array([e.satellites for e in ordered]),
-    )
+    )  # fmt: skip

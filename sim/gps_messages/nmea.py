@@ -1,12 +1,12 @@
 """GPS fixes as NMEA 0183 sentences, written and read with pynmeagps.
 
 Each fix is a GGA (position, height, satellites), an RMC (position, speed, course, date) and a VTG (course, speed).
-Resolution: time 1 ms, position 1e-7 minutes of arc (0.2 mm), height 1 mm, speed 0.001 knots, course 0.001 degrees;
-with these a sentence keeps within the 82 characters that the standard allows.  The sentences carry neither vertical
-velocity nor accuracies: these are NaN when read, and north and east velocity are those of course and speed.
+Resolution: time 1 ms, position 1e-7 minutes of arc (0.2 mm), height 1 mm, speed 0.001 knots, course 0.001 degrees,
+within the 82 characters per sentence of the standard.  The sentences contain neither vertical velocity nor
+accuracies: these are NaN when read, and north and east velocity are computed from course and speed.
 
-Fields are handed to pynmeagps as text: of numbers it would cut times to hundredths, write minutes as 60.00000 where
-they round up.  It frames, checks and parses the sentences.
+Fields are passed to pynmeagps as text: it would truncate numeric times to hundredths and write minutes that round up
+as 60.00000.  It frames, checks and parses the sentences.
 
 References: NMEA 0183 version 2.3 (fields, checksum: exclusive or of all characters between $ and *).
 """
@@ -36,8 +36,8 @@ from sim.gps_messages.fixes import (
     read,
     stamps_ns,
     utc_ns,
+    write,
 )
-from sim.recording import replacing
 
 KNOT_M_S: Final = 1852.0 / 3600.0  # by definition
 _MINUTE: Final = 10**7  # units of position in a minute of arc
@@ -47,26 +47,20 @@ _OURS: Final = re.compile(rb"\$(?!P)[A-Z]{2}(GGA|RMC|VTG),")
 
 def write_nmea(fixes: Fixes, file: str | Path, place: Place = LAUNCH, start: datetime = START) -> Path:
     """Write `encode_nmea` of the same arguments to `file`, complete or not at all, and return its path."""
-    path, data = Path(file), encode_nmea(fixes, place, start)
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
-    return path
+    return write(file, encode_nmea(fixes, place, start))
 
 
 def read_nmea(file: str | Path, place: Place | None = None, start: datetime | None = None) -> Reading:
-    """`decode_nmea` of what is in `file`; ValueError, with its name, where it cannot be read or has no fix."""
-    try:
-        return decode_nmea(read(file), place, start)
-    except ValueError as error:
-        raise ValueError(f"{file}: {error}") from error
+    """`decode_nmea` of the contents of `file`; ValueError, with its name, if it cannot be read or has no fix."""
+    return read(file, decode_nmea, place, start)
 
 
 def encode_nmea(fixes: Fixes, place: Place = LAUNCH, start: datetime = START, talker: str = "GN") -> bytes:
-    """GGA, RMC and VTG of every fix, in the order of `fixes`.
+    """GGA, RMC and VTG of each fix, in the order of `fixes`.
 
-    A time, a height, a speed or a course that is not known is an empty field; without time or place there is no fix.
+    Unknown times, heights, speeds and courses are empty fields; without time or position there is no fix.
 
-    place : origin of the positions      start : UTC at which `t_s` is zero      talker : who speaks, two letters
+    place : origin of the positions      start : UTC at which `t_s` is zero      talker : two letters
 
     Raises
     ------
@@ -86,8 +80,8 @@ def encode_nmea(fixes: Fixes, place: Place = LAUNCH, start: datetime = START, ta
 def decode_nmea(data: bytes, place: Place | None = None, start: datetime | None = None) -> Reading:
     """The fixes in `data`, from any receiver, among sentences and bytes of any other kind.
 
-    Sentences of the same time make one fix, whoever speaks them, and the first of a kind counts.  The date is that
-    of RMC, counted on from one to the next at midnight; where there is none it is that of `start`.
+    Sentences of the same time form one fix, from any talker; the first of each kind counts.  The date is that of
+    RMC, advanced at midnight between two of them, or that of `start` if there is none.
 
     place : origin of the positions, the first fix by default
     start : UTC at which `t_s` is zero, the time of the first fix by default
@@ -111,7 +105,7 @@ def _payloads(fixes: Fixes, i: int, ns: int | None, there: list[float]) -> Itera
     speed, course = float(fixes.speed_m_s[i]), float(fixes.course_rad[i])
     known = good and math.isfinite(speed) and math.isfinite(course)
     knots = f"{speed / KNOT_M_S:.3f}" if known else ""
-    km_h = f"{1.852 * float(knots):.3f}" if known else ""  # of what is written, so that the two agree
+    km_h = f"{1.852 * float(knots):.3f}" if known else ""  # from the written knots, so that the two agree
     millidegrees = round(math.degrees(course) * 1000) % 360_000 if known else 0  # 359.9996 is 0
     degrees = f"{millidegrees // 1000}.{millidegrees % 1000:03d}" if known else ""
     satellites = f"{fixes.satellites[i] if good else 0:02d}"
@@ -132,7 +126,7 @@ def _clock(ns: int | None) -> tuple[str, str]:
 
 
 def _angle(angle_deg: float, digits: int, signs: str) -> tuple[str, str]:
-    """Degrees and minutes, and the hemisphere; counted in whole units, so that no minute rounds up to 60."""
+    """Degrees and minutes, and the hemisphere; in integer units, so that minutes do not round up to 60."""
     units = round(abs(angle_deg) * 60 * _MINUTE)
     degrees, rest = divmod(units, 60 * _MINUTE)
     text = f"{degrees:0{digits}d}{rest // _MINUTE:02d}.{rest % _MINUTE:07d}"
@@ -146,7 +140,7 @@ class _Sentence(NamedTuple):
 
 
 def _sentences(data: bytes, problems: list[Problem]) -> tuple[list[_Sentence], int]:
-    """The sentences that speak of fixes, and how many do not."""
+    """The sentences about fixes, and the number of others."""
     nmea = needed("pynmeagps")
     found, ignored = [], 0
     lines = data.split(b"\n")
@@ -172,7 +166,7 @@ def _sentences(data: bytes, problems: list[Problem]) -> tuple[list[_Sentence], i
 
 
 class _Group(NamedTuple):
-    """Neighbouring sentences of one time: nanoseconds since midnight, and the date where one says it."""
+    """Neighbouring sentences of one time: nanoseconds since midnight, and the date if one contains it."""
 
     clock_ns: int
     sentences: list[_Sentence]
@@ -185,7 +179,7 @@ class _Group(NamedTuple):
 
 
 def _groups(sentences: list[_Sentence], problems: list[Problem]) -> list[_Group]:
-    """Sentences by their time; those that have none by nature (VTG) belong to the one before."""
+    """Sentences grouped by time; VTG, which has none, belongs to the one before."""
     groups: list[_Group] = []
     current: _Group | None = None
     for sentence in sentences:
@@ -205,7 +199,7 @@ def _groups(sentences: list[_Sentence], problems: list[Problem]) -> list[_Group]
 
 
 def _epochs(groups: list[_Group], start: datetime, problems: list[Problem]) -> dict[int, Epoch]:
-    """Fixes by their nanosecond of UTC, in the order of the file."""
+    """Fixes by nanosecond of UTC, in the order of the file."""
     epochs: dict[int, Epoch] = {}
     for ns, group in zip(_dated(groups, start), groups, strict=True):
         epoch = epochs.setdefault(ns, Epoch(group.sentences[0].where))
@@ -222,7 +216,7 @@ def _epochs(groups: list[_Group], start: datetime, problems: list[Problem]) -> d
 
 
 def _dated(groups: list[_Group], start: datetime) -> Iterator[int]:
-    """UTC of the groups.  A clock that falls by more than half a day has passed midnight."""
+    """UTC of the groups.  A clock that drops by more than half a day has passed midnight."""
     turns, before = [], 0
     for last, group in zip([None, *groups], groups, strict=False):
         if last is not None:
@@ -238,7 +232,7 @@ def _dated(groups: list[_Group], start: datetime) -> Iterator[int]:
 
 
 def _take_gga(epoch: Epoch, m: Any) -> None:
-    if not m.quality:  # 0, or nothing
+    if not m.quality:  # 0 or empty
         epoch.void = True
         return
     _take_position(epoch, m)
@@ -262,26 +256,26 @@ _TAKE: Final = {"GGA": _take_gga, "RMC": _take_rmc, "VTG": _take_vtg}
 
 
 def _take_position(epoch: Epoch, m: Any) -> None:
-    """Latitude and longitude, unless another sentence has given them."""
+    """Set latitude and longitude, unless set by another sentence."""
     latitude_deg, longitude_deg = _number(m.lat), _number(m.lon)
     if m.NS not in ("N", "S") or m.EW not in ("E", "W"):
         raise ValueError(f"hemispheres {m.NS!r} and {m.EW!r}: must be N or S, and E or W")
     if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0):
-        raise ValueError(f"latitude {m.lat} deg, longitude {m.lon} deg: there is no such place")
+        raise ValueError(f"latitude {m.lat} deg, longitude {m.lon} deg: no such place")
     if math.isnan(epoch.latitude_deg):
         epoch.latitude_deg, epoch.longitude_deg = latitude_deg, longitude_deg
 
 
 def _take_motion(epoch: Epoch, speed_kn: Any, course_deg: Any) -> None:
-    """Speed, course and the velocity of both, as far as another sentence has not given them."""
+    """Set speed, course and velocity, unless set by another sentence."""
     if math.isnan(epoch.speed_m_s):
         epoch.speed_m_s = _number(speed_kn) * KNOT_M_S
     if math.isnan(epoch.course_deg):
         epoch.course_deg = _number(course_deg) % 360.0
-    course = 0.0 if epoch.speed_m_s == 0.0 else math.radians(epoch.course_deg)  # at rest many leave it out
+    course = 0.0 if epoch.speed_m_s == 0.0 else math.radians(epoch.course_deg)  # many receivers omit it at rest
     epoch.v_e_m_s = (epoch.speed_m_s * math.cos(course), epoch.speed_m_s * math.sin(course), NAN)
 
 
 def _number(value: Any) -> float:
-    """A field as a number; NaN where it is empty or no finite one."""
+    """A field as a number; NaN if it is empty or not finite."""
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else NAN

@@ -1,13 +1,13 @@
 """GPS fixes as UBX NAV-PVT messages, written and read with pyubx2.
 
 Resolution: time 1 ns, latitude and longitude 1e-7 degrees (11 mm), height and accuracies 1 mm, velocities and speed
-1 mm/s, course 1e-5 degrees.  An accuracy that is not known is written as the largest number its field holds.
+1 mm/s, course 1e-5 degrees.  An unknown accuracy is written as the largest number of its field.
 
-pyubx2 divides by the unit of a field and cuts off the rest: half a unit more, away from zero, arrives as meant.
+pyubx2 divides by the unit of a field and truncates: half a unit is added, away from zero, to round instead.
 
 References: u-blox 8 / M8 receiver description including protocol specification, UBX-13003221, UBX-NAV-PVT
 (0x01 0x07), UBX frame structure, and section "UTC representation": date and time are rounded to the nearest
-hundredth of a second, `nano` is what is left, -5 ms to 995 ms.
+hundredth of a second, `nano` is the remainder, -5 ms to 995 ms.
 """
 
 import math
@@ -33,8 +33,8 @@ from sim.gps_messages.fixes import (
     read,
     stamps_ns,
     utc_ns,
+    write,
 )
-from sim.recording import replacing
 
 _SYNC: Final = b"\xb5b"
 _NAV_PVT: Final = b"\x01\x07"
@@ -43,36 +43,30 @@ _FRAME: Final = 8  # bytes around the payload: sync, class, identity, length, ch
 _UNKNOWN: Final = 2**32 - 1
 _GPS_EPOCH_NS: Final = utc_ns(datetime(1980, 1, 6, tzinfo=UTC))
 _WEEK_MS: Final = 7 * 86_400 * 1000
-_2D, _3D, _WITH_DEAD_RECKONING = 2, 3, 4  # fixType of what satellites have a part in
+_2D, _3D, _WITH_DEAD_RECKONING = 2, 3, 4  # fixType with satellites
 
 
 def write_ubx(fixes: Fixes, file: str | Path, place: Place = LAUNCH, start: datetime = START) -> Path:
     """Write `encode_ubx` of the same arguments to `file`, complete or not at all, and return its path."""
-    path, data = Path(file), encode_ubx(fixes, place, start)
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
-    return path
+    return write(file, encode_ubx(fixes, place, start))
 
 
 def read_ubx(file: str | Path, place: Place | None = None, start: datetime | None = None) -> Reading:
-    """`decode_ubx` of what is in `file`; ValueError, with its name, where it cannot be read or has no fix."""
-    try:
-        return decode_ubx(read(file), place, start)
-    except ValueError as error:
-        raise ValueError(f"{file}: {error}") from error
+    """`decode_ubx` of the contents of `file`; ValueError, with its name, if it cannot be read or has no fix."""
+    return read(file, decode_ubx, place, start)
 
 
 def encode_ubx(fixes: Fixes, place: Place = LAUNCH, start: datetime = START) -> bytes:
-    """One NAV-PVT for every fix, in the order of `fixes`.
+    """One NAV-PVT per fix, in the order of `fixes`.
 
-    A message has no way to leave one number out: a fix of which any is not finite (vertical velocity included) is
-    a message without a fix.
+    A message cannot omit a number: a fix with any that is not finite, vertical velocity included, becomes a message
+    without a fix.
 
     place : origin of the positions      start : UTC at which `t_s` is zero
 
     Raises
     ------
-    ValueError      pyubx2 is not installed, or a number or a date that does not fit its field
+    ValueError      pyubx2 is not installed, or a number or date that does not fit its field
     """
     ubx = needed("pyubx2")
     there = geodetic(fixes.p_e_m, place)
@@ -105,39 +99,32 @@ def decode_ubx(data: bytes, place: Place | None = None, start: datetime | None =
             ignored += 1
             continue
         if len(frame) < _SHORTEST + _FRAME:
-            problems.append(Problem("malformed", where, f"NAV-PVT of {len(frame) - _FRAME} bytes, fewer than any has"))
+            problems.append(Problem("malformed", where, f"NAV-PVT of {len(frame) - _FRAME} bytes, too short"))
             continue
         _take(where, ubx.UBXReader.parse(frame), epochs, problems)
     return assemble(epochs, problems, ignored, place, start)
 
 
 def _time(ns: int | None) -> dict[str, Any]:
-    """The fields of time; without any, where it is not known."""
+    """The time fields; empty ones if it is unknown."""
     if ns is None:
         return {"iTOW": 0, "tAcc": _UNKNOWN}
-    from pynmeagps import leapsecond  # pyubx2 brings it along
+    from pynmeagps import leapsecond  # installed with pyubx2
 
     second = (ns + NS // 200) // (NS // 100) // 100
     utc = date_time(second * NS)
     gps_ns = ns - _GPS_EPOCH_NS + leapsecond(utc) * NS
     return {
         "iTOW": (gps_ns + 500_000) // 1_000_000 % _WEEK_MS,
-        "year": utc.year,
-        "month": utc.month,
-        "day": utc.day,
-        "hour": utc.hour,
-        "min": utc.minute,
-        "second": utc.second,
-        "validDate": 1,
-        "validTime": 1,
-        "fullyResolved": 1,
+        **dict(zip(("year", "month", "day", "hour", "min", "second"), utc.timetuple(), strict=False)),
+        **dict.fromkeys(("validDate", "validTime", "fullyResolved"), 1),
         "tAcc": _UNKNOWN,
         "nano": ns - second * NS,
     }
 
 
 def _fix(fixes: Fixes, i: int, there: list[float], *, known: bool) -> dict[str, Any]:
-    """The other fields of fix `i`, which is `there` (deg, deg, m)."""
+    """The other fields of fix `i`, at `there` (deg, deg, m)."""
     velocity, speed, course = fixes.v_e_m_s[i].tolist(), float(fixes.speed_m_s[i]), float(fixes.course_rad[i])
     if not (known and all(map(math.isfinite, (*there, *velocity, speed, course)))):
         accuracies = dict.fromkeys(("hAcc", "vAcc", "sAcc"), _UNKNOWN)
@@ -160,24 +147,24 @@ def _fix(fixes: Fixes, i: int, there: list[float], *, known: bool) -> dict[str, 
         "headMot": _scaled(round(math.degrees(course) * 1e5) % 36_000_000, 1e-5),  # 359.999996 is 0
         "sAcc": _unsigned(fixes.speed_acc_m_s[i], 1000),
         "headAcc": _scaled(course_acc, 1e-5),
-        "pDOP": 99.995,  # no satellites are simulated: 99.99 is what a receiver says that does not know
+        "pDOP": 99.995,  # unknown: no satellites are simulated
     }
 
 
 def _scaled(units: int, unit: float) -> float:
-    """What pyubx2 takes for whole `units` of a field whose unit is `unit`."""
+    """The value that pyubx2 converts to `units` of a field with that `unit`."""
     return (units + math.copysign(0.5, units)) * unit
 
 
 def _unsigned(value: float, per_unit: float) -> int:
-    """An accuracy in whole units, the largest number where it is not known or larger."""
+    """An accuracy in whole units, at most the largest number of the field, which means unknown."""
     return min(round(value * per_unit), _UNKNOWN) if math.isfinite(value) else _UNKNOWN
 
 
 def _frames(data: bytes, problems: list[Problem]) -> Iterator[tuple[str, bytes]]:
-    """Whole UBX messages and where they begin.
+    """Complete UBX messages and their positions.
 
-    After a damaged one the search goes on behind its first two bytes: a wrong length swallows no other message.
+    After a damaged one the search resumes after its first two bytes, so that a wrong length hides no other message.
     """
     valid = needed("pyubx2").isvalid_checksum
     at = data.find(_SYNC)
@@ -191,12 +178,12 @@ def _frames(data: bytes, problems: list[Problem]) -> Iterator[tuple[str, bytes]]
         if end > len(data) and following < 0:
             problems.append(Problem("truncated", where, f"the message ends at byte {end}, the file at {len(data)}"))
         else:
-            problems.append(Problem("checksum", where, "a message whose checksum does not fit it"))
+            problems.append(Problem("checksum", where, "a message with a wrong checksum"))
         at = following
 
 
 def _take(where: str, m: Any, epochs: dict[int, Epoch], problems: list[Problem]) -> None:
-    """Take the message `m` into `epochs`, or say why not."""
+    """Add the message `m` to `epochs`, or its problem to `problems`."""
     if not (m.validDate and m.validTime):
         problems.append(Problem("no time", where, "the receiver did not know date and time"))
         return
@@ -221,13 +208,10 @@ def _take(where: str, m: Any, epochs: dict[int, Epoch], problems: list[Problem])
         course_deg=m.headMot % 360.0,
         speed_m_s=m.gSpeed / 1000,
         accuracy=(
-            _known(m.hAcc, 1000),
-            _known(m.vAcc, 1000),
-            _known(m.sAcc, 1000),
-            _known(round(m.headAcc * 1e5), 10**5),
+            _known(m.hAcc, 1000), _known(m.vAcc, 1000), _known(m.sAcc, 1000), _known(round(m.headAcc * 1e5), 10**5),
         ),
         satellites=m.numSV,
-    )
+    )  # fmt: skip
 
 
 def _known(units: int, per_unit: int) -> float:

@@ -1,9 +1,9 @@
-"""A multi-rotor that hovers: it sways about its place, and leans as much as that takes.
+"""A hovering multi-rotor that sways about its position and tilts accordingly.
 
-The rotors push along the body's z axis alone, so the thrust leans into every horizontal acceleration, and the specific
-force stays along the body's z axis whatever the tilt: an accelerometer aboard never sees a hovering craft lean.
-(Martin and Salauen, "The true role of accelerometer feedback in quadrotor control", ICRA 2010: what it does see is the
-rotors' drag, which is left out here, with all other drag.)
+Rotor thrust acts only along the body z axis, so the craft tilts into every horizontal acceleration and the specific
+force stays along the body z axis whatever the tilt: an accelerometer aboard does not sense the tilt of a hovering
+craft.  Drag is neglected (Martin and Salauen, "The true role of accelerometer feedback in quadrotor control", ICRA
+2010: what the accelerometer does sense is rotor drag).
 """
 
 import math
@@ -16,7 +16,7 @@ from estimator.interface import Array
 from sim.log import Phase
 from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics
 
-Sines = tuple[tuple[float, float, float], ...]  # amplitude, frequency in hertz, phase in radians of each
+Sines = tuple[tuple[float, float, float], ...]  # of each: amplitude, frequency in hertz, phase in radians
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,14 +24,14 @@ class Hover:
     """Hovering in still air, each coordinate and the heading a sum of sines.
 
     north, east : amplitude [m], frequency [Hz], phase [rad] of each sine      yaw : the same, amplitude in radians
-    heading_rad : mean heading          rotor_rpm : speed of the rotors: what vibrates, and what current flows
+    heading_rad : mean heading          rotor_rpm : rotor speed, for vibration and motor current
     """
 
     heading_rad: float = 0.0
     north: Sines = ((0.40, 0.11, 0.0), (0.15, 0.31, 1.0))
     east: Sines = ((0.35, 0.09, 2.0), (0.15, 0.27, 3.0))
     yaw: Sines = ((math.radians(4.0), 0.05, 4.0), (math.radians(1.5), 0.17, 5.0))
-    rotor_rpm: float = 5500.0  # held exactly, a multiple of the sample rate would fold down to a constant force
+    rotor_rpm: float = 5500.0  # not a multiple of the sample rate, which would alias to a constant force
     height_m: float = 5.0
     phase: ClassVar[Phase] = Phase.FLYING
     wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
@@ -49,13 +49,13 @@ class Hover:
         (n, dn, ddn, dddn), (e, de, dde, ddde) = _derivatives(self.north, t_s), _derivatives(self.east, t_s)
         yaw, dyaw = _derivatives(self.yaw, t_s)[:2]
         none = 0.0 * t_s
-        # The thrust is gravity's opposite and the acceleration: down in the body is its reverse.
+        # Thrust balances gravity and accelerates; body z points the opposite way.
         z, dz = _unit(np.stack([-ddn, -dde, none + GRAVITY_M_S2]), np.stack([-dddn, -ddde, none]))
         cosine, sine = np.cos(self.heading_rad + yaw), np.sin(self.heading_rad + yaw)
         nose, dnose = np.stack([cosine, sine, none]), dyaw * np.stack([-sine, cosine, none])
         y, dy = _unit(np.cross(z, nose, axis=0), np.cross(dz, nose, axis=0) + np.cross(z, dnose, axis=0))
         x = np.cross(y, z, axis=0)
-        # dR/dt = R skew(omega): omega is how each axis moves towards the next.
+        # dR/dt = R skew(omega): omega is the rate of each axis towards the next.
         omega_b = np.stack([np.sum(z * dy, axis=0), np.sum(x * dz, axis=0), -np.sum(x * dy, axis=0)], axis=-1)
         return Kinematics(
             np.stack([x, y, z], axis=-1).swapaxes(0, 1),
@@ -76,7 +76,7 @@ def _derivatives(sines: Sines, t_s: Array) -> Array:
 
 
 def _unit(v: Array, dv: Array) -> tuple[Array, Array]:
-    """Direction of the vectors `v`, shape (3, n), and how it changes where they change by `dv`."""
+    """Unit vectors of `v`, shape (3, n), and their derivative when the derivative of `v` is `dv`."""
     length = np.linalg.norm(v, axis=0)
     u = v / length
     return u, (dv - u * np.sum(u * dv, axis=0)) / length

@@ -1,8 +1,8 @@
-"""Closed-form motion behind the Plant protocol: the open-loop truth for tests and claims.
+"""Closed-form motion as a Plant: open-loop truth for tests and claims.
 
-A motion says where the body is and how it turns at any time, as closed forms over an array of times.  The
-plant samples them at the ends of the ticks, and takes the inertial means of a tick by Gauss-Legendre
-quadrature, which shares nothing with the delta-angle, delta-velocity arithmetic of `sim.truth.integrate_imu`.
+A motion gives position and rotation in closed form over an array of times.  The plant samples it at the ends of the
+ticks and computes the inertial means by Gauss-Legendre quadrature, independent of the delta-angle, delta-velocity
+arithmetic of `sim.truth.integrate_imu`.
 """
 
 import math
@@ -26,9 +26,9 @@ _NODES = 5  # of the quadrature: exact for polynomials of degree 9 within a tick
 
 @dataclass(frozen=True, slots=True)
 class Kinematics:
-    """A motion at n times, body against earth.
+    """A motion at n times, relative to the earth.
 
-    R_eb : (n, 3, 3)   omega_b_rad_s : (n, 3), without the earth's   p_e_m, v_e_m_s, a_e_m_s2 : (n, 3)
+    R_eb : (n, 3, 3)   omega_b_rad_s : (n, 3), earth rotation excluded   p_e_m, v_e_m_s, a_e_m_s2 : (n, 3)
     """
 
     R_eb: Array
@@ -39,7 +39,7 @@ class Kinematics:
 
 
 class Motion(Protocol):
-    """A closed form of a body's motion from `t_s` = 0 on; ``rotor_rpm``, if it has one, is the speed of its rotors."""
+    """Closed-form motion of a body from `t_s` = 0; an optional ``rotor_rpm`` gives its rotor speed."""
 
     phase: ClassVar[Phase]
 
@@ -68,7 +68,7 @@ def _require(motion: object, name: str, unit: str, right: bool, choose: str) -> 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """At rest at the attitude given, as on a table."""
+    """At rest at the given attitude, as on a table."""
 
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
@@ -86,9 +86,9 @@ class Rest:
 
 @dataclass(frozen=True, slots=True)
 class HandHeld:
-    """Turned about in a hand that stays where it is: each Euler angle is a sum of sines.
+    """Turned in a hand at a fixed position: each Euler angle is a sum of sines.
 
-    peak_rate_rad_s : the body rate never exceeds this       hz, phase_rad : (3, m), of roll, pitch and yaw
+    peak_rate_rad_s : upper bound of the body rate       hz, phase_rad : (3, m), of roll, pitch and yaw
     """
 
     peak_rate_rad_s: float = math.radians(3.0)
@@ -115,12 +115,12 @@ class HandHeld:
 
 @dataclass(frozen=True, slots=True)
 class Coning:
-    """The body's z axis draws a cone about the vertical: the classical worst case of attitude integration.
+    """The body z axis moves on a cone about the vertical: the classical worst case of attitude integration.
 
-    The rotation vector is amplitude (cos wt, sin wt, 0), whence the body rate
-    (-w sin A sin wt, w sin A cos wt, -w (1 - cos A)): a mean yaw rate without any mean yaw.
+    The rotation vector is amplitude (cos wt, sin wt, 0), so the body rate is
+    (-w sin A sin wt, w sin A cos wt, -w (1 - cos A)): a mean yaw rate without mean yaw.
 
-    amplitude_rad : half angle of the cone      rate_rad_s : w, once round the cone in 2 pi / w
+    amplitude_rad : half angle of the cone      rate_rad_s : w, one revolution in 2 pi / w
     """
 
     amplitude_rad: float = math.radians(5.0)
@@ -147,7 +147,7 @@ class Coning:
 class FreeFall:
     """Dropped, tumbling about its y axis: an accelerometer reads zero.
 
-    height_m : where it is let go       tumble_rad_s : pitch rate
+    height_m : of the release       tumble_rad_s : pitch rate
     """
 
     height_m: float = 100.0
@@ -168,7 +168,7 @@ class FreeFall:
 
 @dataclass(frozen=True, slots=True)
 class StraightLevel:
-    """Straight and level with the nose into the flow, its airspeed steady or surging as a cosine.
+    """Straight and level without sideslip, airspeed constant or with a cosine acceleration.
 
     heading_rad : of the nose                       airspeed_m_s : mean
     surge_m_s2, surge_s : amplitude and period of the acceleration along the nose
@@ -204,9 +204,9 @@ class StraightLevel:
 
 @dataclass(frozen=True, slots=True)
 class SteadyTurn:
-    """Level turn without sideslip in a wind that blows steadily: tan(bank) = airspeed x turn rate / g.
+    """Level turn without sideslip in steady wind: tan(bank) = airspeed x turn rate / g.
 
-    bank_rad : positive turns right      airspeed_m_s : along the nose      heading_rad : of the nose at first
+    bank_rad : positive turns right      airspeed_m_s : along the nose      heading_rad : initial
     """
 
     bank_rad: float
@@ -222,7 +222,7 @@ class SteadyTurn:
 
     @property
     def turn_rate_rad_s(self) -> float:
-        """Rate of the heading; the earth's rotation and gravity's change with latitude left out."""
+        """Rate of the heading; the earth's rotation and the change of gravity with latitude are neglected."""
         return GRAVITY_M_S2 * math.tan(self.bank_rad) / self.airspeed_m_s
 
     def at(self, t_s: Array) -> Kinematics:
@@ -230,7 +230,7 @@ class SteadyTurn:
         V, rate = self.airspeed_m_s, self.turn_rate_rad_s
         yaw = self.heading_rad + rate * t_s
         sine, cosine = np.sin(yaw), np.cos(yaw)
-        # The chord of the arc flown through the air points to the mean heading; sinc lives with a rate of 0.
+        # The chord of the arc through the air points along the mean heading; sinc allows a rate of 0.
         chord = V * t_s * np.sinc(rate * t_s / (2.0 * np.pi))
         mean_yaw = self.heading_rad + 0.5 * rate * t_s
         omega_b = rate * np.array([0.0, math.sin(self.bank_rad), math.cos(self.bank_rad)])
@@ -247,9 +247,9 @@ class SteadyTurn:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Inside loops without end, at constant airspeed and pitch rate, from level flight.
+    """Continuous inside loops at constant airspeed and pitch rate, from level flight.
 
-    pitch_rate_rad_s : once round in 2 pi / rate; the radius is airspeed / rate
+    pitch_rate_rad_s : one loop takes 2 pi / rate; the radius is airspeed / rate
     """
 
     pitch_rate_rad_s: float = math.radians(90.0)
@@ -279,11 +279,11 @@ class Loop:
 
 
 def inertial_rate_and_force(motion: Motion, t_s: Array, latitude_rad: float) -> tuple[Array, Array]:
-    """What perfect sensors at the centre of gravity feel at the times `t_s`, shape (n,).
+    """What perfect sensors at the centre of gravity measure at the times `t_s`, shape (n,).
 
     Returns
     -------
-    omega_b_rad_s : (n, 3), against inertial space      force_b_m_s2 : (n, 3), R.T (a + 2 earth x v - g)
+    omega_b_rad_s : (n, 3), inertial      force_b_m_s2 : (n, 3), R.T (a + 2 earth x v - g)
     """
     at = motion.at(t_s)
     earth_e = earth_rate_e_rad_s(latitude_rad)
@@ -294,7 +294,7 @@ def inertial_rate_and_force(motion: Motion, t_s: Array, latitude_rad: float) -> 
 
 
 def motion_rows(motion: Motion, n_ticks: int, dt_s: float, latitude_rad: float) -> Array:
-    """The truth of `n_ticks` ticks of `motion`, shape (n_ticks,) of TRUTH; the sensors' columns stay zero."""
+    """The truth of `n_ticks` ticks of `motion`, shape (n_ticks,) of TRUTH; sensor columns stay zero."""
     rows = np.zeros(n_ticks, TRUTH_DTYPE)
     t_s: Array = np.arange(1, n_ticks + 1) * np.float64(dt_s)
     rows["t_s"] = t_s
@@ -317,7 +317,7 @@ def motion_rows(motion: Motion, n_ticks: int, dt_s: float, latitude_rad: float) 
 
 
 class PrescribedPlant:
-    """A body that moves as `motion` says, whatever it is commanded; see `sim.plant.Plant`.
+    """A body that follows `motion` and ignores commands; see `sim.plant.Plant`.
 
     release_s : time from which it is judged
     """
@@ -334,11 +334,11 @@ class PrescribedPlant:
         self._truth = self._rows = np.zeros(0, TRUTH_DTYPE)
 
     def reset(self, log: Log) -> None:
-        """Work out the motion for as long as `log`."""
+        """Compute the motion for the length of `log`."""
         self._truth = log.truth
         self._rows = motion_rows(self.motion, len(log), self.dt_s, math.radians(self.latitude_deg))
 
-    def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:  # noqa: ARG002 - it obeys nobody
+    def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:  # noqa: ARG002 - commands are ignored
         """Fill truth row `k`; never ends the flight."""
         self._truth[k] = self._rows[k]
         return None

@@ -1,8 +1,8 @@
-"""A calibration turn-table: a full circle about each axis of the body, that axis held level across the field.
+"""A calibration turn-table: a full circle about each body axis, that axis held level across the magnetic field.
 
-The other two axes then pass exactly along the field and against it (Dilshad and Jahan, 2014, turn their
-magnetometer "in a circle for each of the three axes" so).  Between two circles a quarter turn lays the next axis
-across the field.
+The other two axes then pass exactly along and against the field, as when Dilshad and Jahan (2014) turn their
+magnetometer "in a circle for each of the three axes".  A quarter turn between circles brings the next axis across
+the field.
 """
 
 import math
@@ -16,16 +16,16 @@ from estimator.rotation import from_euler
 from sim.log import Phase
 from sim.motion.prescribed_plant import CALM, Kinematics
 
-# Axis of the body and angle of each part; the axes x, y, z start north, east, down (magnetic).
+# Body axis and angle of each turn; the axes x, y, z start north, east, down (magnetic).
 _PARTS = ((1, 2.0 * math.pi), (2, 0.5 * math.pi), (0, 2.0 * math.pi), (1, 0.5 * math.pi), (2, 2.0 * math.pi))
 
 
 @dataclass(frozen=True, slots=True)
 class TurnTable:
-    """Circles about y, x and z in turn, each from rest to rest, then still.
+    """Circles about y, x and z, each from rest to rest, with quarter turns between them; then at rest.
 
-    heading_rad : of the body's x axis at first; the magnetic declination lays every axis of turning across the field
-    circle_s : of a circle      quarter_s : of a quarter turn between two
+    heading_rad : initial heading of the x axis; equal to the magnetic declination, turn axes lie across the field
+    circle_s : duration of a circle      quarter_s : duration of a quarter turn
     """
 
     heading_rad: float = 0.0
@@ -43,7 +43,7 @@ class TurnTable:
 
     @property
     def duration_s(self) -> float:
-        """Time until all three circles are turned."""
+        """Time until all three circles are complete."""
         return 3.0 * self.circle_s + 2.0 * self.quarter_s
 
     def at(self, t_s: Array) -> Kinematics:

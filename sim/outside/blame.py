@@ -1,11 +1,11 @@
-"""Somebody else's code runs here: whatever it raises becomes one line that names the fault and its place.
+"""Running user code: any exception becomes one line that names the fault and its place.
 
 Flight code, scenario files and the packages behind entry points may raise anything: SystemExit, KeyboardInterrupt, an
-exception that cannot be printed.  `theirs` is the one place that catches it.  A real Ctrl-C, SIGTERM and the time
-limit pass through, for the handlers of `sim.outside.signals` remember what they heard.
+exception that cannot be printed.  `theirs` is the only place that catches them.  A real Ctrl-C, SIGTERM and the time
+limit pass through, because the handlers of `sim.outside.signals` keep a record.
 
-The place is the innermost line of the traceback that is neither ours nor of Python or an installed library; of an
-installed package that offers the code, its own lines count (`home`).
+The place is the innermost line of the traceback that belongs neither to wingslevel nor to Python or an installed
+library; lines of the installed package that provides the code do count (`home`).
 """
 
 import os
@@ -20,7 +20,7 @@ from typing import Any
 from sim.outside.signals import Interrupted, TimedOut, check, heard, listening
 from sim.outside.wording import class_name, described, printable
 
-TRACEBACK = "WINGSLEVEL_TRACEBACK"  # set to 1 in the environment, whole tracebacks are shown, in workers too
+TRACEBACK = "WINGSLEVEL_TRACEBACK"  # environment variable: 1 shows full tracebacks, in workers too
 _PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
 _ROOT = Path(__file__).resolve().parents[2]
 _NOT_THEIRS = tuple(
@@ -31,34 +31,34 @@ _INSTALLED = ("site-packages", "dist-packages")
 
 
 class Refused(ValueError):
-    """Something that others' code gave and that cannot be used: ours, so that its text alone is the line."""
+    """User code returned something invalid; the message is the text alone, without class and place."""
 
 
 def tracebacks_shown() -> bool:
-    """Whether this process was told to show whole tracebacks."""
+    """Whether this process shows full tracebacks."""
     return _Switch.on
 
 
 class _Switch:
-    """Whether this process shows whole tracebacks."""
+    """Whether this process shows full tracebacks."""
 
     on = False
 
 
 def show_tracebacks(on: bool) -> None:
-    """Whether the whole traceback of what others' code raises goes to standard error, besides the line."""
+    """Write full tracebacks of user code to standard error, besides the one-line message, or not."""
     _Switch.on = on
 
 
 class theirs:
-    """A block in which somebody else's code runs: what it raises becomes ``refuse(line)``.
+    """A block that runs user code: any exception becomes ``refuse(line)``.
 
-    The working directory is afterwards what it was: paths are relative to it.
+    The working directory is restored afterwards, as paths are relative to it.
 
     Parameters
     ----------
-    refuse      makes what is raised instead, from the line
-    home        file, or name of the package, that their code is in even where it is an installed one
+    refuse      makes the exception to raise instead, from the line
+    home        file, or name of the installed package, that contains the user code
     """
 
     def __init__(self, refuse: Callable[[str], Exception], home: str = "") -> None:
@@ -68,7 +68,7 @@ class theirs:
         self._listening.__enter__()
         self._before, self._folder = heard(), _working_directory()
 
-    # A generator would not do: contextlib lets StopIteration through where a RuntimeError is raised from it.
+    # Not a generator: contextlib mishandles StopIteration raised by the block.
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
@@ -76,23 +76,23 @@ class theirs:
             os.chdir(self._folder)
         try:
             if heard() != self._before or (kind is TimedOut and heard()[1]) or (kind is Interrupted and heard()[0]):
-                check()  # it may have been swallowed, and something else raised instead
+                check()  # the block may have caught it and raised something else
             if error is not None:
-                raise self._refuse(told(error, self._home)) from error
+                raise self._refuse(summary(error, self._home)) from error
         finally:
             self._listening.__exit__(None, None, None)
 
 
 def _working_directory() -> str:
-    """The working directory; empty where it has been removed."""
+    """The working directory; empty if it has been removed."""
     try:
         return os.getcwd()
     except OSError:
         return ""
 
 
-def told(error: BaseException, home: str = "") -> str:
-    """What others' code raised, on one line with its place; shows the traceback where that is wanted."""
+def summary(error: BaseException, home: str = "") -> str:
+    """An exception of user code on one line, with its place; also shows the traceback if enabled."""
     show_traceback(error)
     if issubclass(type(error), Refused):
         return printable(str(error))
@@ -101,9 +101,9 @@ def told(error: BaseException, home: str = "") -> str:
 
 
 def place_of(error: BaseException, home: str = "") -> str:
-    """Where in others' code `error` was raised: ``own.py, line 12, in update``; empty where not in theirs.
+    """Where in user code `error` was raised: ``own.py, line 12, in update``; empty if not in user code.
 
-    Empty for a syntax error of a file too: its text says where.
+    Also empty for a syntax error of a file, whose text includes the place.
     """
     try:
         if issubclass(type(error), SyntaxError) and not str(error.filename or "<").startswith("<"):  # type: ignore[attr-defined]
@@ -116,25 +116,25 @@ def place_of(error: BaseException, home: str = "") -> str:
                 found = f"{Path(code.co_filename).name}, line {step.tb_lineno}{within}"
             step = step.tb_next
         return printable(found)
-    except BaseException:  # an exception's class is anyone's, and what it says of itself may raise
+    except BaseException:  # the exception is of a user class, which may raise in turn
         return ""
 
 
 def home_of(code: object) -> str:
-    """The top-level package of the class of `code`, or of the class or function `code`; empty where it is ours."""
+    """The top-level package of `code`, an object, class or function; empty if it is part of wingslevel."""
     try:
         named = code if isinstance(code, type) or hasattr(code, "__code__") else type(code)
         package = str(named.__module__).partition(".")[0]  # type: ignore[attr-defined]
-    except BaseException:  # anyone's class
+    except BaseException:  # user class
         return ""
     return "" if package in (*_PACKAGES, "__main__", "builtins", "functools") else package
 
 
 def shown(value: Any) -> str:
-    """`value` as Python writes it, on one printable line; its type where it cannot be written."""
+    """The repr of `value` on one printable line; its type if it has none."""
     try:
         return printable(repr(value), 100)
-    except BaseException:  # it is anyone's value
+    except BaseException:  # user class
         return f"a {class_name(value)} that cannot be printed"
 
 
@@ -148,7 +148,7 @@ def _is_theirs(frame: FrameType, home: str) -> bool:
 
 
 def show_traceback(error: BaseException) -> None:
-    """Write the traceback of `error` to standard error, where tracebacks are wanted."""
+    """Write the traceback of `error` to standard error, if tracebacks are enabled."""
     if not (_Switch.on or os.environ.get(TRACEBACK) == "1"):
         return
     try:

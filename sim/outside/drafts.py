@@ -1,8 +1,7 @@
-"""Files and folders that are being written: under a hidden name, until they are complete.
+"""Files and folders written under a hidden name until they are complete.
 
-What has its real name is complete.  Whoever is killed while writing leaves something hidden behind, which carries the
-mark of the process (`estimator.compiler.owner`); whoever writes into the same folder next removes it, and leaves alone
-what a living process is writing there.
+Anything with its final name is complete.  A process killed while writing leaves a hidden entry marked with its id
+(`estimator.compiler.owner`); the next writer into the same folder removes it, but not those of running processes.
 """
 
 import errno
@@ -16,20 +15,20 @@ from pathlib import Path
 
 from estimator.compiler import owner
 
-_LONGEST = 40  # characters of the real name in a hidden one; a file system takes 255 in all
+_LONGEST = 40  # characters of the final name in a hidden one; file systems allow 255 in all
 _LONGEST_NAME = 180  # bytes of the name of a folder, with room for a number
 _count = itertools.count(1)
 
 
 def hidden(path: Path) -> Path:
-    """A name beside `path`, with its suffix, for what will be renamed to it; never the same twice."""
+    """A unique hidden name beside `path`, with its suffix, to be renamed to it."""
     return path.with_name(f".{path.stem[:_LONGEST]}.{next(_count)}.{owner.mark()}{path.suffix[:_LONGEST]}")
 
 
 def sweep(*folders: Path) -> None:
-    """Remove what killed processes have left half written in the folders, not in folders below them."""
+    """Remove incomplete entries of killed processes from the folders, not from subfolders."""
     for folder in folders:
-        with suppress(OSError):  # what cannot be removed is not in the way
+        with suppress(OSError):  # what cannot be removed does no harm
             for entry in os.scandir(folder):
                 if owner.is_temporary(entry.name) and owner.is_left_behind(Path(entry.path)):
                     if entry.is_dir(follow_symlinks=False):
@@ -39,11 +38,11 @@ def sweep(*folders: Path) -> None:
 
 
 def probe(folder: Path) -> None:
-    """Try whether a new folder could be made at `folder`, or be filled where it exists; nothing is left.
+    """Check that `folder` can be created, or written to if it exists; leaves no trace.
 
     Raises
     ------
-    OSError      why not
+    OSError      the reason
     """
     here = _existing(folder)
     for missing in (folder, *folder.parents):
@@ -62,33 +61,33 @@ def probe(folder: Path) -> None:
 
 @dataclass
 class Draft:
-    """A folder that is being filled.
+    """A folder being written.
 
-    path : where, until the end of the block      place : where it is afterwards
+    path : until the end of the block      place : afterwards
     """
 
     path: Path
     place: Path
 
     def named(self, text: str) -> str:
-        """`text` about what is being written, with the names that it will have."""
+        """`text` with the temporary path replaced by the final one."""
         return text.replace(str(self.path), str(self.place))
 
 
 @contextmanager
 def new_folder(into: Path, name: str) -> Iterator[Draft]:
-    """Give a new folder to fill; at the end of the block it appears in `into`, complete, as `name` or ``name-2``, ...
+    """Give a new folder to fill; at the end of the block it appears complete in `into` as `name` or ``name-2``, ...
 
-    No folder is ever written over, whoever else is writing there.  On any exception nothing is left.
+    No existing folder is overwritten, even with concurrent writers.  On any exception nothing is left.
 
     Raises
     ------
-    OSError      where the system refuses
+    OSError      the folder cannot be written
     """
     name = _fit(name)
     here = _existing(into)
     if here != into:
-        into = Path(os.path.normpath(into))  # folders that are not there yet: ``..`` means nothing in them
+        into = Path(os.path.normpath(into))  # resolve ``..`` in folders that do not exist yet
     sweep(here, here.parent)
     shell = hidden(here / name)
     draft = Draft(shell / name, into / name)
@@ -101,14 +100,14 @@ def new_folder(into: Path, name: str) -> Iterator[Draft]:
 
 
 def _fit(name: str) -> str:
-    """`name` as the name of one folder: not hidden, no separators, nothing unprintable, not too long."""
+    """`name` as a valid folder name: not hidden, without separators or unprintable characters, not too long."""
     fit = "".join(c if c.isprintable() and c not in "/\\" else "_" for c in name)
     fit = os.fsencode(fit)[:_LONGEST_NAME].decode(errors="ignore")
     return f"_{fit[1:]}" if fit.startswith(".") or not fit else fit
 
 
 def _existing(folder: Path) -> Path:
-    """`folder`, or the nearest one above it that exists."""
+    """`folder`, or its nearest existing parent."""
     return next((p for p in (folder, *folder.absolute().parents) if p.exists()), folder)
 
 
@@ -131,7 +130,7 @@ def _publish(source: Path, into: Path, name: str, shell: Path) -> Path:
 
 
 def _move(source: Path, place: Path, shell: Path) -> None:
-    """Rename the folder `source` to `place`, with the folders above it that are missing, all at once."""
+    """Rename the folder `source` to `place`, creating missing parents in the same atomic step."""
     top = place
     while not os.path.lexists(top.parent):
         top = top.parent

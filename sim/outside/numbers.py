@@ -1,6 +1,6 @@
-"""Numbers as people type them: plain, finite, in ASCII digits.
+"""Parsing numbers typed by users: plain, finite, in ASCII digits.
 
-Python reads far more as a number than anybody means: ``nan``, ``inf``, ``1_000``, the digits of other scripts.
+Python accepts much more: ``nan``, ``inf``, ``1_000``, the digits of other scripts.
 """
 
 import math
@@ -8,17 +8,17 @@ import re
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _WHOLE = re.compile(r"[+-]?[0-9]{1,18}")
-_LONGEST = 60  # characters: no number that is meant has more
+_LONGEST = 60  # characters of a sensible number
 RIGHT = "write a plain finite number, for instance 5, 0.25 or 1e-3"
 RIGHT_WHOLE = "write a whole number, for instance 5"
 
 
 def number(text: str) -> float:
-    """The number that `text` spells.
+    """The number in `text`.
 
     Raises
     ------
-    ValueError      what would be right: it is none, or it is not finite
+    ValueError      not a plain finite number; the message says what is valid
     """
     tidy = text.strip(" ")
     if len(tidy) > _LONGEST or not _NUMBER.fullmatch(tidy):
@@ -30,7 +30,7 @@ def number(text: str) -> float:
 
 
 def whole(text: str) -> int:
-    """The whole number that `text` spells; ValueError with what would be right."""
+    """The whole number in `text`; ValueError with what is valid."""
     tidy = text.strip(" ")
     if not _WHOLE.fullmatch(tidy):
         raise ValueError(RIGHT_WHOLE)
@@ -38,7 +38,7 @@ def whole(text: str) -> int:
 
 
 def is_odd(text: str) -> bool:
-    """Whether Python takes `text` for a number, but none that a person should type: ``nan``, ``1_000``, ``0x10``."""
+    """Whether `text` is a number to Python but not to `number`: ``nan``, ``1_000``, ``0x10``."""
     try:
         number(text)
     except ValueError:

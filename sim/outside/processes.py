@@ -12,9 +12,9 @@ _LOOK_S = 0.5
 
 
 def die_with_parent() -> bool:
-    """Have the system kill this process when its parent ends, however it ends (prctl(2)); False where it cannot.
+    """Have the system kill this process when its parent ends in any way (prctl(2)); False if unsupported.
 
-    Survives exec, so that it can be the ``preexec_fn`` of a program that is started.
+    Survives exec, so that it can be used as ``preexec_fn``.
     """
     if sys.platform != "linux":
         return False
@@ -22,9 +22,9 @@ def die_with_parent() -> bool:
 
 
 def end_with_parent(parent: int) -> None:
-    """End this process when the one with the id `parent`, which started it, ends: at once if it has already.
+    """End this process when its parent, with the id `parent`, ends; at once if it has ended already.
 
-    By `die_with_parent`, or where the system does not do that by a thread that looks for the parent twice a second.
+    By `die_with_parent`, or if unsupported by a thread that checks twice a second.
     """
     by_the_system = die_with_parent()
     if os.getppid() != parent:

@@ -1,9 +1,9 @@
-"""Readers that are not to be trusted with a damaged file, in a process of their own.
+"""Running readers that may crash on damaged files in a separate process.
 
-Some parsers in C crash on a few flipped bytes, ask for gigabytes or never come back.  `call` runs one of them in a
-child with limits on time and memory.  What comes back are arrays, texts and numbers, and nothing else.
+Some C parsers crash on corrupt files, allocate gigabytes or never return.  `call` runs them in a child process with
+time and memory limits, and returns only arrays, texts and numbers.
 
-One child serves many calls; it is started anew when it has died.  It ends with this process, however that ends.
+One child serves many calls and is restarted if it dies.  It ends with this process in any case.
 """
 
 import atexit
@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 LONGEST_S = 60.0
-MEMORY, PER_BYTE = 1 << 30, 10  # bytes of memory, and more for each byte of the file
+MEMORY, PER_BYTE = 1 << 30, 10  # bytes of memory, and additional ones per byte of the file
 _PR_SET_PDEATHSIG = 1
-_FRAME = 8  # bytes that tell the length of a request
-_SAFE = {  # what an answer may be made of, beside what pickle knows itself
+_FRAME = 8  # bytes of the length of a request
+_SAFE = {  # types allowed in an answer, besides those built into pickle
     "numpy": ("dtype", "ndarray"),
     "numpy._core.multiarray": ("_reconstruct", "scalar"),
     "numpy._core.numeric": ("_frombuffer",),
@@ -36,35 +36,35 @@ _SAFE = {  # what an answer may be made of, beside what pickle knows itself
 
 
 class Failed(Exception):
-    """The reader refused the file, in its own words."""
+    """The reader rejected the file, with its message."""
 
 
 class Crashed(Failed):
-    """The process died of the file."""
+    """The process crashed."""
 
 
 class TooLong(Failed):
-    """It did not come back in time."""
+    """The time limit was exceeded."""
 
 
 class TooLarge(Failed):
-    """It wanted more memory than a file of that size should need."""
+    """The memory limit was exceeded."""
 
 
 def call(function: str, path: Path, *, longest_s: float = LONGEST_S, **options: Any) -> Any:
-    """What ``function(path, **options)`` returns, run in the child.
+    """Run ``function(path, **options)`` in the child and return its result.
 
-    function : ``module:name``, of a module that can be imported here
+    function : ``module:name``
 
     Raises
     ------
-    Failed      the reader raised something, or one of its kinds above
+    Failed      the reader raised an exception; or one of the subclasses above
     """
     child = _current()
     memory = MEMORY + PER_BYTE * os.path.getsize(path)
     try:
         return child.ask((function, os.fsencode(os.path.abspath(path)), options, memory, longest_s), longest_s)
-    except BaseException as error:  # also Ctrl-C: what it would still answer belongs to no question
+    except BaseException as error:  # also Ctrl-C: a late answer would be taken for the next one
         if type(error) not in (Failed, TooLarge):
             _end()
         raise
@@ -94,7 +94,7 @@ class _Child:
             late.set()
             self.process.kill()
 
-        clock = threading.Timer(longest_s + 5.0, kill)  # the child starts, and has a limit of its own
+        clock = threading.Timer(longest_s + 5.0, kill)  # time to start; the child has its own limit
         clock.daemon = True
         clock.start()
         try:
@@ -114,13 +114,13 @@ class _Child:
         raise (TooLarge if kind == "memory" else Failed)(str(answer))
 
     def _ended(self) -> int | None:
-        """Exit code of a child whose answer broke off; it is ended where it has not."""
+        """Exit code of a child whose answer is incomplete, None if it is still running."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             return self.process.wait(timeout=1.0)
         return None
 
     def end(self) -> None:
-        """End the process, wherever it is."""
+        """Kill the process."""
         self.process.kill()
         self.process.wait()
         for pipe in (self.process.stdin, self.process.stdout):
@@ -130,7 +130,7 @@ class _Child:
 
 
 class _Answer(pickle.Unpickler):
-    """An answer, of which nothing runs here."""
+    """Unpickles an answer without running any code in it."""
 
     def find_class(self, module: str, name: str) -> Any:
         if name not in _SAFE.get(module, ()):
@@ -142,11 +142,11 @@ _child: _Child | None = None
 
 
 def _current() -> _Child:
-    """The child of this process, started where there is none, or where it has ended meanwhile."""
+    """The child of this process, started if there is none or if it has ended."""
     global _child
     if _child is not None and _child.of == os.getpid() and _child.process.poll() is not None:
         _end()
-    if _child is None or _child.of != os.getpid():  # never that of a process which this one was forked from
+    if _child is None or _child.of != os.getpid():  # not the child of a parent this process was forked from
         _child = _Child()
     return _child
 
@@ -162,16 +162,16 @@ atexit.register(_end)
 
 
 def serve(parent: int) -> None:
-    """Answer the requests of the process `parent` until it ends: what the child runs."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted, and ends this process
+    """Main function of the child: answer the requests of the process `parent` until that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles it and ends this process
     with contextlib.suppress(ImportError, OSError, ValueError):
         import resource
 
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file behind
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no core dumps
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever a reader prints does not mix with the answers
+    os.dup2(2, 1)  # output of a reader must not mix with the answers
     while os.name != "posix" or os.getppid() == parent:
         raw = requests.read(_FRAME)
         if len(raw) < _FRAME:
@@ -191,14 +191,14 @@ def _answer(
         _send(answer, answers)
     except MemoryError:
         _send(("memory", str(memory)), answers)
-    except Exception as error:  # whatever it raises is told in its words
+    except Exception as error:  # reported with its message
         _send(("failed", " ".join(str(error).split()) or type(error).__name__), answers)
     finally:
         free()
 
 
 def _send(answer: tuple[str, Any], answers: BinaryIO) -> None:
-    """Pickle first, then send: an answer that cannot be pickled leaves nothing in the pipe."""
+    """Pickle first, then send, so that a pickling error leaves nothing in the pipe."""
     if answer[0] == "answer":
         made = io.BytesIO()
         pickle.Pickler(made, protocol=5).dump(answer)
@@ -209,7 +209,7 @@ def _send(answer: tuple[str, Any], answers: BinaryIO) -> None:
 
 
 def _limit(memory: int, longest_s: float) -> Any:
-    """Limit this process from here on, where the system can; returns what lifts the limits."""
+    """Limit time and memory of this process, if supported; returns a function that lifts the limits."""
     try:
         import resource
     except ImportError:
@@ -231,7 +231,7 @@ def _limit(memory: int, longest_s: float) -> Any:
 
 
 def _now() -> int:
-    """Bytes of address space that this process has; 0 where the system does not say."""
+    """Address space of this process in bytes; 0 if unknown."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):

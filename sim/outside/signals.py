@@ -1,13 +1,13 @@
-"""Ctrl-C, SIGTERM and the clock, told apart from whatever flight code raises.
+"""Ctrl-C, SIGTERM and the time limit, distinguished from exceptions of flight code.
 
-Flight code may raise anything, KeyboardInterrupt too: that is its fault, and a result of the flight.  A person who
-presses Ctrl-C, a CI system that cancels (SIGTERM) and a flight that takes too long must still get through.  So the
-handlers installed here raise exceptions of their own, and remember that they did, should flight code swallow them.
+Flight code may raise anything, even KeyboardInterrupt; that is a result of the flight.  A real Ctrl-C, a CI system
+that cancels (SIGTERM) and the time limit of a flight must still take effect.  The handlers installed here raise their
+own exceptions, and keep a record in case flight code catches them.
 
-While a kernel is compiled, the handlers raise nothing: the compiler calls back from C, where an exception is printed
-and lost.  What they have heard is raised at the compiler's next step.
+While a kernel is compiled the handlers do not raise: the compiler calls back from C, where exceptions are printed and
+lost.  The exception is raised at the next step of the compiler instead.
 
-Python lets only the main thread have signal handlers; elsewhere the blocks below change nothing.
+Python allows signal handlers only in the main thread; elsewhere the blocks below have no effect.
 """
 
 import math
@@ -21,22 +21,22 @@ from typing import NamedTuple
 
 from estimator.compiler import compiling
 
-ECHO_S = 0.5  # a second signal within this time is the same one: a terminal and a parent both pass it on
-REPEAT_S = 1.0  # between two reminders that the time is up
-# What ends a command: Ctrl-C, a CI system that cancels, a terminal that is closed.
+ECHO_S = 0.5  # a second signal within this time is the same one, passed on by both terminal and parent
+REPEAT_S = 1.0  # between reminders after the time limit
+# Signals that end a command: Ctrl-C, cancelled by CI, terminal closed.
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
 class Interrupted(KeyboardInterrupt):
-    """Somebody wants the command to end."""
+    """The command has been interrupted."""
 
 
 class TimedOut(BaseException):
-    """The time for this flight is up."""
+    """The time limit of this flight has passed."""
 
 
 class _Limit(NamedTuple):
-    """What a block may take, when it began, and what had been spent compiling by then; seconds."""
+    """Time limit of a block, its start, and the compile time up to then; seconds."""
 
     seconds: float
     began_s: float
@@ -44,18 +44,18 @@ class _Limit(NamedTuple):
 
     @property
     def left_s(self) -> float:
-        """What is left of it; compiling does not count."""
+        """Remaining time; compiling does not count."""
         return self.seconds + (compiling.spent_s() - self.spent_s) - (time.monotonic() - self.began_s)
 
 
 class _Heard:
-    """What the handlers of this process have heard."""
+    """Signals received by the handlers of this process."""
 
-    at_s: float | None = None  # of the last signal that ends the command
+    at_s: float | None = None  # time of the last signal that ends the command
     time_up = False
     limit = _Limit(math.inf, 0.0, 0.0)
-    held: type[BaseException] | None = None  # what is to be raised at the compiler's next step
-    tell_extended: Callable[[float], None] | None = None
+    held: type[BaseException] | None = None  # to be raised at the next step of the compiler
+    extended: Callable[[float], None] | None = None
 
 
 _heard = _Heard()
@@ -65,7 +65,7 @@ _heard = _Heard()
 def listening() -> Iterator[None]:
     """Raise `Interrupted` on Ctrl-C, SIGTERM and SIGHUP inside the block.
 
-    Signals that are ignored (``nohup``), and those that somebody else handles, are left as they are.
+    Signals that are ignored (``nohup``) or have another handler are left alone.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -86,9 +86,9 @@ def listening() -> Iterator[None]:
 
 @contextmanager
 def limited(seconds: float | None) -> Iterator[None]:
-    """Raise `TimedOut` when the block takes longer than `seconds`, None for ever, and again until it ends.
+    """Raise `TimedOut` when the block takes longer than `seconds` (None: no limit), repeatedly until it ends.
 
-    The time in which kernels are compiled does not count.
+    The time spent compiling kernels does not count.
     """
     if seconds is None or threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
         yield
@@ -104,13 +104,13 @@ def limited(seconds: float | None) -> Iterator[None]:
         _heard.time_up = False
 
 
-def on_extended(tell: Callable[[float], None] | None) -> None:
-    """Call `tell` with the seconds by which the time for a block ends later, for kernels had to be compiled."""
-    _heard.tell_extended = tell
+def on_extended(report: Callable[[float], None] | None) -> None:
+    """Call `report` with the remaining seconds whenever a time limit is extended for compiling."""
+    _heard.extended = report
 
 
 def check() -> None:
-    """Raise again what was heard and got lost: `Interrupted` or `TimedOut`."""
+    """Raise `Interrupted` or `TimedOut` again if it was raised and lost."""
     if _heard.at_s is not None:
         raise Interrupted
     if _heard.time_up:
@@ -118,7 +118,7 @@ def check() -> None:
 
 
 def heard() -> tuple[float | None, bool]:
-    """When the last signal that ends the command was heard, and whether the time is up: to compare around a block."""
+    """Time of the last signal that ends the command, and whether the time limit has passed; compare around a block."""
     return _heard.at_s, _heard.time_up
 
 
@@ -135,8 +135,8 @@ def _time_up(_number: int, _frame: FrameType | None) -> None:
     if left_s > 0.0:
         later_s = max(left_s, REPEAT_S)
         signal.setitimer(signal.ITIMER_REAL, later_s, REPEAT_S)
-        if _heard.tell_extended is not None:
-            _heard.tell_extended(later_s)
+        if _heard.extended is not None:
+            _heard.extended(later_s)
         return
     _heard.time_up = True
     _raise(TimedOut)
@@ -150,7 +150,7 @@ def _raise(what: type[BaseException]) -> None:
 
 
 def _raise_held() -> None:
-    """What `_raise` held back, once; in the main thread, where it was heard."""
+    """Raise what `_raise` held back, once, in the main thread."""
     if _heard.held is not None and threading.current_thread() is threading.main_thread():
         what, _heard.held = _heard.held, None
         raise what

@@ -1,18 +1,17 @@
-"""Air data: a pitot tube with its pressure sensor for the airspeed, and a barometer for the height.
+"""Air data: airspeed from a pitot tube with its pressure sensor, and height from a barometer.
 
-Airspeed from the pressure difference q of a pitot tube, V = sqrt(2 q / rho), the compressibility at model
-speeds (0.1 % at 20 m/s) left out:
+Airspeed from the pitot pressure q, V = sqrt(2 q / rho); compressibility (0.1 % at 20 m/s) is neglected:
 
     q = convert((1 + gain) rho V^2 / 2 + offset + noise)
 
-Height from the pressure of the standard atmosphere (ISO 2533, troposphere), lagged first:
+Height from the pressure of the standard atmosphere (ISO 2533, troposphere), after a first-order lag:
 
     p = p0 (1 - L h / T0)^(g0 / R L) + drift + wander + noise
 
-Density and pressure at the launch point are the standard atmosphere's, and the firmware knows them.  It takes the
-density of the launch point at every height (the airspeed would be half a percent lower for each 100 m).
+Density and pressure at the launch point are standard and known to the firmware, which uses the density of the launch
+point at every height (half a percent of airspeed per 100 m).
 
-Sample j of each is true at step j * steps_per_sample of the physics (interpolated between two ticks) and is in the
+Sample j of each is valid at physics step j * steps_per_sample (interpolated between two ticks) and arrives in the
 first tick that ends at that time or later.
 """
 
@@ -27,7 +26,14 @@ from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2
 from sim import place
 from sim.clock import Rates
-from sim.sensors.noise import Source, gauss_markov, require, require_scale
+from sim.sensors.noise import (
+    Source,
+    gauss_markov,
+    lag_weights,
+    require,
+    require_scale,
+    to_step,
+)
 
 # ISO 2533: at sea level, and the lapse rate.
 PRESSURE_PA: Final = 101325.0
@@ -41,11 +47,15 @@ _EXPONENT: Final = G_M_S2 / (GAS_CONSTANT_J_KG_K * LAPSE_K_M)
 class AirspeedParams:
     """Errors of a pitot tube with its pressure sensor; the defaults are perfect.
 
-    rate_hz : of its samples, which divides the physics rate
-    noise_pa : sigma of each sample        offset_pa : sigma of what is left of the zero offset after power-up
-    gain : sigma of the relative error of the pressure: the sensor's, and that of the tube's place in the flow
-    axial : the tube feels the airspeed's part along the nose alone; otherwise flow from any side, as good tubes do
-    range_pa : full scale; infinite is none      step_pa : one step of the converter; 0 is not quantised
+    A larger figure is a worse sensor unless stated otherwise, and 0 removes that error.
+
+    rate_hz : sample rate, which must divide the physics rate (Hz, default 10).  Higher: fresher airspeed
+    noise_pa : sigma of each sample (Pa, default 0); at low airspeed the same noise costs more m/s
+    offset_pa : sigma of the zero offset that remains after power-up (Pa, default 0)
+    gain : sigma of the relative pressure error, of sensor and tube position (fraction, default 0)
+    axial : the tube measures only the component along the nose; if not, the full airspeed (default False)
+    range_pa : full scale (Pa, default inf: none).  Lower: fast flight saturates
+    step_pa : converter step (Pa, default 0: not quantised)
     """
 
     rate_hz: float = 10.0
@@ -57,22 +67,25 @@ class AirspeedParams:
     step_pa: float = 0.0
 
     def __post_init__(self) -> None:
-        require(self, "Hz", "rate_hz", least=0.1)
-        require(self, "Pa", "noise_pa", "offset_pa")
-        require(self, "(a fraction)", "gain")
-        require_scale(self, "Pa", "range_pa", "step_pa")
+        require(self, "rate_hz", least=0.1)
+        require(self, "noise_pa", "offset_pa", "gain")
+        require_scale(self, "range_pa", "step_pa")
 
 
 @dataclass(frozen=True, slots=True)
 class BarometerParams:
     """Errors of a barometer whose height is zero at the launch point; the defaults are perfect.
 
-    rate_hz : of its samples, which divides the physics rate
-    lag_s : time constant with which the height follows; 0 is none
-    noise_pa : sigma of each sample      drift_pa_min : sigma of the steady drift of weather and temperature
-    wander_pa : sigma of the slowly wandering error      wander_s : correlation time of that error
-    range_pa : full scale of the pressure, 0 its other end; infinite is none
-    step_pa : one step of the converter; 0 is not quantised
+    A larger figure is a worse sensor unless stated otherwise, and 0 removes that error.  12 Pa are about 1 m.
+
+    rate_hz : sample rate, which must divide the physics rate (Hz, default 10).  Higher: fresher height
+    lag_s : time constant of the lag of the height (s, default 0)
+    noise_pa : sigma of each sample (Pa, default 0)
+    drift_pa_min : sigma of the steady drift with weather and temperature (Pa per minute, default 0)
+    wander_pa : sigma of the correlated error (Pa, default 0)
+    wander_s : correlation time of that error (s, default 30).  Higher: averages out more slowly
+    range_pa : full scale, from 0 (Pa, default inf: none).  Below the pressure on the ground: saturates there
+    step_pa : converter step (Pa, default 0: not quantised)
     """
 
     rate_hz: float = 10.0
@@ -85,19 +98,17 @@ class BarometerParams:
     step_pa: float = 0.0
 
     def __post_init__(self) -> None:
-        require(self, "Hz", "rate_hz", least=0.1)
-        require(self, "s", "lag_s")
-        require(self, "s", "wander_s", least=0.001)
-        require(self, "Pa", "noise_pa", "wander_pa")
-        require(self, "Pa/min", "drift_pa_min")
-        require_scale(self, "Pa", "range_pa", "step_pa")
+        require(self, "rate_hz", least=0.1)
+        require(self, "lag_s", "noise_pa", "wander_pa", "drift_pa_min")
+        require(self, "wander_s", least=0.001)
+        require_scale(self, "range_pa", "step_pa")
 
 
 UNIT = np.dtype(
     [
         ("fitted", "i8"),
         ("steps_per_tick", "i8"),
-        ("airspeed_steps", "i8"),  # physics steps between two samples; 0 is not fitted
+        ("airspeed_steps", "i8"),  # physics steps between samples; 0: not fitted
         ("baro_steps", "i8"),
         ("density_kg_m3", "f8"),
         ("gain", "f8"),
@@ -113,7 +124,7 @@ UNIT = np.dtype(
     ],
     align=True,
 )
-MEMORY = np.dtype([("height_m", "f8"), ("height_was_m", "f8")], align=True)  # lagged, at this tick and the one before
+MEMORY = np.dtype([("height_m", "f8"), ("height_was_m", "f8")], align=True)  # lagged, at the ends of the tick
 NOISE = (("airspeed_noise_pa", "f8"), ("baro_error_pa", "f8"))
 
 
@@ -127,10 +138,7 @@ def make(
     airspeed: AirspeedParams | None, barometer: BarometerParams | None, rates: Rates, source: Source,
     unit: NDArray[np.void],
 ) -> None:  # fmt: skip
-    """Make both: draw what stays for the flight, set their constants in `unit`, shape (1,) of UNIT.
-
-    The weights of the lag are its exact solution for a height that is linear within the tick, as the GPS's are.
-    """
+    """Make both: draw the errors of the flight, set their constants in `unit`, shape (1,) of UNIT."""
     unit["fitted"] = 1
     unit["steps_per_tick"] = rates.steps_per_tick
     if airspeed is not None:
@@ -143,16 +151,14 @@ def make(
     if barometer is not None:
         unit["baro_steps"] = rates.steps_per_sample("barometer", barometer.rate_hz)
         unit["baro_range_pa"], unit["baro_step_pa"] = barometer.range_pa, barometer.step_pa
-        step = rates.dt_s / barometer.lag_s if barometer.lag_s > 0.0 else math.inf
-        before, end = math.exp(-step), 1.0 + math.expm1(-step) / step
-        unit["before"], unit["start"], unit["end"] = before, 1.0 - before - end, end
+        unit["before"], unit["start"], unit["end"] = lag_weights(barometer.lag_s, rates.dt_s)
 
 
 def draw(
     airspeed: AirspeedParams | None, barometer: BarometerParams | None, rates: Rates, source: Source,
     noise: NDArray[np.void],
 ) -> None:  # fmt: skip
-    """Draw the errors of every tick into the columns NOISE of `noise`; a sample has those of its own tick."""
+    """Draw the errors of every tick into the columns NOISE of `noise`; a sample uses those of its tick."""
     n = len(noise)
     if airspeed is not None and airspeed.noise_pa > 0.0:
         noise["airspeed_noise_pa"] = airspeed.noise_pa * source("airspeed noise").standard_normal(n)
@@ -171,7 +177,7 @@ def draw(
 
 @kernel
 def measure_air(truth, measured, noise, k, unit, memory):  # type: ignore[no-untyped-def]
-    """Hold the last samples in row `k`, or take in new ones; `unit` and `memory` are records of UNIT and MEMORY."""
+    """Hold the last samples in row `k`, or write new ones; `unit` and `memory` are records of UNIT and MEMORY."""
     row, spt = measured[k], unit.steps_per_tick
     row.air_new = 0
     row.airspeed_m_s = measured[k - 1].airspeed_m_s if k > 0 else np.nan
@@ -180,7 +186,7 @@ def measure_air(truth, measured, noise, k, unit, memory):  # type: ignore[no-unt
     if unit.airspeed_steps:
         step = (k + 1) * spt // unit.airspeed_steps * unit.airspeed_steps
         if step > k * spt:
-            late = (step - k * spt) / spt  # share of the tick gone by, 0 < late <= 1
+            late = (step - k * spt) / spt  # fraction of the tick, 0 < late <= 1
             speed = (1.0 - late) * _felt_m_s(older, unit) + late * _felt_m_s(newer, unit)
             row.airspeed_m_s = _airspeed_m_s(speed, noise[k].airspeed_noise_pa, unit)
             row.air_new = 1
@@ -196,30 +202,30 @@ def measure_air(truth, measured, noise, k, unit, memory):  # type: ignore[no-unt
 
 @kernel
 def _felt_m_s(row, unit):  # type: ignore[no-untyped-def]
-    """Airspeed that the tube feels, negative from behind."""
+    """Airspeed at the tube, negative from behind."""
     return row.airspeed_m_s * np.cos(row.alpha_rad) * np.cos(row.beta_rad) if unit.axial else row.airspeed_m_s
 
 
 @kernel
 def _airspeed_m_s(speed_m_s, noise_pa, unit):  # type: ignore[no-untyped-def]
-    """What the sensor makes of the airspeed `speed_m_s`; a pressure below zero reads no speed."""
+    """Reading at the airspeed `speed_m_s`; a negative pressure reads as zero."""
     sensed = unit.gain * 0.5 * unit.density_kg_m3 * speed_m_s * abs(speed_m_s) + unit.offset_pa + noise_pa
-    pressure = _quantised(min(max(sensed, -unit.range_pa), unit.range_pa), unit.airspeed_step_pa)
+    pressure = to_step(min(max(sensed, -unit.range_pa), unit.range_pa), unit.airspeed_step_pa)
     return np.sqrt(2.0 * max(pressure, 0.0) / unit.density_kg_m3)
 
 
 @kernel
 def _height_m(height_m, error_pa, unit):  # type: ignore[no-untyped-def]
-    """What the barometer makes of the height `height_m` above the launch point."""
+    """Reading at the height `height_m` above the launch point."""
     if error_pa == 0.0 and unit.baro_step_pa == 0.0 and np.isinf(unit.baro_range_pa):
-        return height_m  # there and back would cost digits
+        return height_m  # converting to pressure and back would cost digits
     pressure = min(max(_pressure_pa(place.ELEVATION_M + height_m) + error_pa, 0.0), unit.baro_range_pa)
-    return height_at_m(_quantised(pressure, unit.baro_step_pa))
+    return height_at_m(to_step(pressure, unit.baro_step_pa))
 
 
 @kernel
 def height_at_m(pressure_pa):  # type: ignore[no-untyped-def]
-    """Height above the launch point at which the standard atmosphere has this pressure."""
+    """Height above the launch point of this pressure in the standard atmosphere."""
     return TEMPERATURE_K / LAPSE_K_M * (1.0 - (pressure_pa / PRESSURE_PA) ** (1.0 / _EXPONENT)) - place.ELEVATION_M
 
 
@@ -230,13 +236,8 @@ def _pressure_pa(height_m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _quantised(pressure_pa, step_pa):  # type: ignore[no-untyped-def]
-    return step_pa * np.floor(pressure_pa / step_pa + 0.5) if step_pa > 0.0 else pressure_pa
-
-
-@kernel
 def _lag(older_m, newer_m, k, unit, memory):  # type: ignore[no-untyped-def]
-    """Let the height follow through tick `k`; before the first it stood still."""
+    """Advance the lagged height through tick `k`; before the first tick the height was constant."""
     if k == 0:
         memory.height_m = memory.height_was_m = newer_m
         return

@@ -1,13 +1,13 @@
-"""Allan deviation of a signal at rest, and the noise that explains it.
+"""Allan deviation of a signal at rest, and the noise model fitted to it.
 
 With x the integral of the signal and tau = m / rate, the overlapping Allan variance is the mean of
 (x(t + 2 tau) - 2 x(t + tau) + x(t))^2 / (2 tau^2) over all t (Riley, Handbook of Frequency Stability Analysis,
-NIST SP 1065, Eqn 11).  Of the noise of an inertial sensor it is (IEEE Std 952-1997, Annex C)
+NIST SP 1065, Eqn 11).  For the noise of an inertial sensor it is (IEEE Std 952-1997, Annex C)
 
 AVAR(tau) = N^2 / tau + (2 ln 2 / pi) B^2 + K^2 tau / 3
 
-with white noise N, flicker noise B and rate random walk K.  N is the two-sided density: that of a data sheet is
-one-sided, n = sqrt(2) N.  The deviation of flicker noise alone is flat at 0.664 B.
+with white noise N, flicker noise B and rate random walk K.  N is two-sided; data sheets give the one-sided density
+n = sqrt(2) N.  The deviation of flicker noise alone is flat at 0.664 B.
 """
 
 import math
@@ -22,12 +22,12 @@ from estimator.interface import Array
 
 FLICKER: Final = 2.0 * math.log(2.0) / math.pi  # Allan variance of flicker noise with B = 1
 SHORTEST_RECORD: Final = 4  # in longest averages
-MODEL_ERROR: Final = 0.01  # the three terms need not describe a curve better than to this part of it
+MODEL_ERROR: Final = 0.01  # relative: the three terms need not fit better than this
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseModel:
-    """Coefficients of IEEE Std 952, for a signal in some unit.
+    """Coefficients of IEEE Std 952, in the unit of the signal.
 
     white : N, unit sqrt(s)      flicker : B, unit      walk : K, unit / sqrt(s)
     """
@@ -63,7 +63,7 @@ def variance(signal: Array, m: NDArray[np.int64]) -> Array:
     if np.any(m < 1) or np.any(2 * m > n):
         raise ValueError(f"averages over {m.tolist()} samples of a record of {n}: choose from 1 to {n // 2}")
     x = np.zeros((signal.shape[1], n + 1))
-    np.cumsum((signal - signal.mean(axis=0)).T, axis=1, out=x[:, 1:])  # the mean would only cost digits
+    np.cumsum((signal - signal.mean(axis=0)).T, axis=1, out=x[:, 1:])  # removing the mean preserves precision
     return np.asarray(_variance(x, m))
 
 
@@ -83,11 +83,11 @@ def _variance(x, several):  # type: ignore[no-untyped-def]
 
 
 def fit(tau_s: Array, variances: Array) -> NoiseModel:
-    """Noise whose Allan variance comes closest to the mean of `variances`, shape (n, axes), at `tau_s`, shape (n,).
+    """Noise model whose Allan variance is closest to the mean of `variances`, shape (n, axes), at `tau_s`, shape (n,).
 
     Least squares of the relative residuals, no coefficient below zero (Lawson & Hanson, Solving Least Squares
-    Problems, 1974).  Where there are several axes, each residual weighs by the scatter of its mean: long averages
-    are few in a record and say less.
+    Problems, 1974).  With several axes, residuals are weighted by the scatter of their mean: a record has few long
+    averages.
     """
     from scipy.optimize import nnls
 
@@ -98,7 +98,7 @@ def fit(tau_s: Array, variances: Array) -> NoiseModel:
     weight = 1.0 / np.hypot(scatter, MODEL_ERROR)
     shapes = np.column_stack([1.0 / tau_s, np.full_like(tau_s, FLICKER), tau_s / 3.0])
     relative = shapes * (weight / mean)[:, None]
-    scale = np.linalg.norm(relative, axis=0)  # columns of one length: the three differ by many powers of ten
+    scale = np.linalg.norm(relative, axis=0)  # normalised columns: they differ by many powers of ten
     squares, _ = nnls(relative / scale, weight)
     white, flicker, walk = np.sqrt(squares / scale).tolist()
     return NoiseModel(white, flicker, walk)

@@ -1,6 +1,5 @@
-"""The circuit board that gyro and accelerometer sit on: where, how crooked, how warm, on what supply, how shaken."""
+"""The circuit board of gyro and accelerometer: position, misalignment, temperature, supply and vibration."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,12 +8,12 @@ from numpy.typing import NDArray
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.clock import Rates
-from sim.sensors.noise import Output, Source, require
+from sim.sensors.noise import Output, Source, require, require_triple
 
 Triple = tuple[float, float, float]
 STILL: Triple = (0.0, 0.0, 0.0)
-LONGEST_REST_S = 600.0  # it is simulated, and held in memory
-MOST_SUPPLY_ERROR = 0.1  # five sigma of it and the largest sag leave a supply above zero
+LONGEST_REST_S = 600.0  # all of it is simulated and held in memory
+MOST_SUPPLY_ERROR = 0.1  # five sigma and the largest sag leave the supply above zero
 MOST_SUPPLY_SAG = 0.4
 
 
@@ -22,16 +21,20 @@ MOST_SUPPLY_SAG = 0.4
 class BoardParams:
     """What gyro and accelerometer share.  The defaults are a perfect board at the centre of gravity.
 
-    lever_arm_b_m : (3,) from the centre of gravity to gyro and accelerometer, body axes
-    mounting_deg : (3,) roll, pitch and yaw by which the board is crooked, and the firmware does not know it
-    supply_tolerance : sigma of the supply voltage's relative error, constant in a flight
-    supply_sag : relative fall of the supply at full throttle
-    converter_ratiometric : the converter measures in units of the supply; otherwise of a reference of its own
-    rest_s : how long the firmware averages the sensors, level on the ground, before a flight that starts in the air
-    (a throw is calibrated in the hand); 0 is not at all
-    warming_k : how much warmer the parts are in the end than at power-up      warming_s : time constant of that
-    vibration_g, vibration_deg_s : amplitude of each axis at the motor speed `vibration_rpm`, once per
-    revolution; it grows with the square of the speed (a rotor out of balance)
+    A larger figure disturbs the sensors more unless stated otherwise, and 0 removes that effect.
+
+    lever_arm_b_m : (3,) from the centre of gravity to gyro and accelerometer, body axes (m, default 0)
+    mounting_deg : (3,) roll, pitch and yaw misalignment of the board, unknown to the firmware (deg, default 0)
+    supply_tolerance : sigma of the relative error of the supply voltage, constant in a flight (fraction, default 0)
+    supply_sag : relative fall of the supply at full throttle (fraction, default 0)
+    converter_ratiometric : the converter's reference is the supply; if not, a fixed voltage (default True)
+    rest_s : time the firmware averages the sensors, level on the ground, before a flight that starts in the air; a
+        throw is calibrated in the hand (s, default 0: not at all).  Higher: the turn-on bias is known better
+    warming_k : how much warmer the parts end up than at power-up (K, default 0)
+    warming_s : time constant of the warm-up (s, default 300).  Lower: biases change faster after power-up
+    vibration_g, vibration_deg_s : amplitude per axis at the motor speed `vibration_rpm`, once per revolution; it
+        grows with the square of the speed, as of an unbalanced rotor (g and deg/s, default 0)
+    vibration_rpm : motor speed at which those amplitudes hold (rpm, default 8000).  Higher: less at the same speed
     """
 
     lever_arm_b_m: Triple = STILL
@@ -47,32 +50,23 @@ class BoardParams:
     vibration_rpm: float = 8000.0
 
     def __post_init__(self) -> None:
-        require(self, "(a fraction)", "supply_tolerance", "supply_sag")
-        for name, most in (("supply_tolerance", MOST_SUPPLY_ERROR), ("supply_sag", MOST_SUPPLY_SAG)):
-            if getattr(self, name) > most:
-                raise ValueError(f"BoardParams.{name} = {getattr(self, name)!r} (a fraction): choose at most {most:g}")
-        for name, unit in (("lever_arm_b_m", "m"), ("mounting_deg", "deg")):
-            value = getattr(self, name)
-            if len(value) != 3 or not all(map(math.isfinite, value)):
-                raise ValueError(f"BoardParams.{name} = {value!r} {unit}: choose three finite numbers")
-        require(self, "K", "warming_k")
-        require(self, "s", "rest_s")
-        if self.rest_s > LONGEST_REST_S:
-            raise ValueError(f"BoardParams.rest_s = {self.rest_s:g} s: choose at most {LONGEST_REST_S:g} s")
-        require(self, "s", "warming_s", least=0.001)
-        require(self, "g", "vibration_g")
-        require(self, "deg/s", "vibration_deg_s")
-        require(self, "rpm", "vibration_rpm", least=1.0)
+        require(self, "supply_tolerance", most=MOST_SUPPLY_ERROR)
+        require(self, "supply_sag", most=MOST_SUPPLY_SAG)
+        require_triple(self, "lever_arm_b_m", "mounting_deg")
+        require(self, "rest_s", most=LONGEST_REST_S)
+        require(self, "warming_k", "vibration_g", "vibration_deg_s")
+        require(self, "warming_s", least=0.001)
+        require(self, "vibration_rpm", least=1.0)
 
     def supply_power(self, output: Output) -> int:
-        """Power of the supply, relative to its nominal value, that a part of this `output` is multiplied by."""
+        """Power of the relative supply voltage by which the reading of a part with this `output` is multiplied."""
         if not (self.supply_tolerance or self.supply_sag) or output == "digital":
             return 0
         return (output == "ratiometric") - self.converter_ratiometric
 
 
 def warming(params: BoardParams, t_s: Array) -> Array:
-    """How much warmer than at power-up the parts are `t_s` later, K: a body that takes up a constant power.
+    """Temperature rise of the parts `t_s` after power-up, K, under constant heating.
 
     Newton's law of cooling: dT/dt = (warming_k - T) / warming_s, T(0) = 0.
     """
@@ -81,10 +75,10 @@ def warming(params: BoardParams, t_s: Array) -> Array:
 
 UNIT = np.dtype(
     [
-        ("changes", "i8"),  # whether anything here differs from tick to tick
+        ("changes", "i8"),  # whether anything here changes from tick to tick
         ("dt_s", "f8"),
         ("lever_arm_b_m", "f8", (3,)),
-        ("supply", "f8"),  # relative to its nominal value, without load
+        ("supply", "f8"),  # relative to nominal, without load
         ("supply_sag", "f8"),
         ("warming_k", "f8"),
         ("warming_s", "f8"),
@@ -94,18 +88,18 @@ UNIT = np.dtype(
 )
 MEMORY = np.dtype(
     [
-        ("turned_rad", "f8"),  # angle of the rotor at the end of the tick, less whole turns
-        ("rotor_rad", "f8"),  # and half-way through it
-        ("rotor_hz", "f8"),  # mean speed in the tick
-        ("warmer_k", "f8"),  # than at power-up
-        ("supply", "f8"),  # relative to its nominal value
+        ("turned_rad", "f8"),  # rotor angle at the end of the tick, modulo a turn
+        ("rotor_rad", "f8"),  # and at mid-tick
+        ("rotor_hz", "f8"),  # mean over the tick
+        ("warmer_k", "f8"),  # rise since power-up
+        ("supply", "f8"),  # relative to nominal
     ],
     align=True,
 )
 
 
 def make(params: BoardParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
-    """Make one board: draw its supply and set its constants in `unit`, shape (1,) of UNIT."""
+    """Make one board: draw its supply voltage and set its constants in `unit`, shape (1,) of UNIT."""
     unit["dt_s"] = rates.dt_s
     unit["lever_arm_b_m"] = params.lever_arm_b_m
     wrong = params.supply_tolerance * source("board supply").standard_normal() if params.supply_tolerance else 0.0
@@ -113,21 +107,15 @@ def make(params: BoardParams, rates: Rates, source: Source, unit: NDArray[np.voi
     for name in ("supply_sag", "warming_k", "warming_s"):
         unit[name] = getattr(params, name)
     unit["shaken_at_hz"] = params.vibration_rpm / 60.0
-    changing = (
-        params.supply_tolerance,
-        params.supply_sag,
-        params.warming_k,
-        params.vibration_g,
-        params.vibration_deg_s,
-    )
-    unit["changes"] = any(changing)
+    names = ("supply_tolerance", "supply_sag", "warming_k", "vibration_g", "vibration_deg_s")
+    unit["changes"] = any(getattr(params, name) for name in names)
 
 
 @kernel
 def attend(truth, k, unit, memory):  # type: ignore[no-untyped-def]
-    """Follow warmth, supply and rotor through tick k; `memory` is a record of MEMORY.
+    """Update temperature, supply and rotor for tick k; `memory` is a record of MEMORY.
 
-    The rotor's speed in the tick is the mean of those at its ends.
+    The rotor speed of the tick is the mean of those at its ends.
     """
     row = truth[k]
     memory.warmer_k = -unit.warming_k * np.expm1(-row.t_s / unit.warming_s)  # as `warming`

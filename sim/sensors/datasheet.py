@@ -1,4 +1,4 @@
-"""Parts by their data sheets: every file ``parts/*.toml`` is one part, every figure in it has its source.
+"""Sensor parts by their data sheets.  Each file ``parts/*.toml`` is one part; every figure states its source.
 
     name = "ITG-3200"
     maker = "InvenSense"
@@ -8,8 +8,8 @@
     [gyro]
     range_deg_s = { value = 2000.0, source = "Full-Scale Range" }
 
-Headings are kinds of sensors, keys the fields of their parameter dataclass.  A source names the row of the data
-sheet, or says ``typical`` where that has none.  What a file leaves out is perfect: no error, no limit.
+Sections are kinds of sensors, keys the fields of their parameter dataclass.  A source names the row of the data
+sheet, or is ``typical`` if the data sheet has none.  Figures not given are perfect: no error, no limit.
 """
 
 import math
@@ -41,7 +41,7 @@ GENERIC: Final[Mapping[str, Any]] = MappingProxyType(
         "barometer": BarometerParams(),
     }
 )
-"""Parts of every kind with the defaults of their dataclass."""
+"""A part of each kind with the defaults of its dataclass."""
 
 PERFECT: Final[Mapping[str, Any]] = MappingProxyType(
     {
@@ -57,12 +57,12 @@ PERFECT: Final[Mapping[str, Any]] = MappingProxyType(
         ),
     }
 )  # fmt: skip
-"""Parts of every kind without any error; magnetometer and air data have none by default."""
+"""A part of each kind without errors; magnetometer and air data have none by default."""
 
 KINDS: Final = tuple(GENERIC)
 _BUILT_IN: Final = {
-    "generic": (GENERIC, "the default of every kind: what cheap parts of the time were like"),
-    "perfect": (PERFECT, "no error, no limit, no delay, of every kind"),
+    "generic": (GENERIC, "the default of every kind: a cheap part of the time"),
+    "perfect": (PERFECT, "every kind: no error, no limit, no delay"),
 }
 _ABOUT = ("name", "maker", "summary", "datasheet")
 
@@ -71,8 +71,8 @@ _ABOUT = ("name", "maker", "summary", "datasheet")
 class Part:
     """One part as its data sheet describes it.
 
-    devices : kind -> its parameters, for every kind of sensor that is in the part
-    sources : ``kind.field`` -> where the figure comes from, for every figure of the file
+    devices : kind -> parameters, for each kind of sensor in the part
+    sources : ``kind.field`` -> source of the figure, for each figure of the file
     """
 
     name: str
@@ -84,19 +84,19 @@ class Part:
 
 
 def part_names() -> list[str]:
-    """Names of all parts that have a file here, in order."""
+    """Names of all shipped parts, sorted."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 def load_part(name: str, folder: Path | None = None, files: Mapping[str, str] = MappingProxyType({})) -> Part:
     """The part called `name` (``itg3200``, ``ITG-3200``, ``generic``, ``perfect``) or in a file, ``path/to/part.toml``.
 
-    folder : that the path of a file is relative to       files : path -> text, read instead of the disk
+    folder : the path of a file is relative to it       files : path -> text, used instead of the disk
 
     Raises
     ------
-    ValueError      one line: no such part (with the near misses) or file, or what is wrong in the file: its key, the
-                    value, the unit, and what would be right
+    ValueError      one line: no such part (with suggestions) or file, or what is wrong in the file: key, value,
+                    unit, and what is valid
     """
     if name in _BUILT_IN:
         devices, summary = _BUILT_IN[name]
@@ -108,18 +108,18 @@ def load_part(name: str, folder: Path | None = None, files: Mapping[str, str] = 
     known = {_plain(stem): stem for stem in part_names()}
     if _plain(name) not in known:
         hint = near_misses(name, [*known.values(), *_BUILT_IN])
-        raise ValueError(f"unknown part {name!r}: {hint} (one's own: path/to/part.toml)")
+        raise ValueError(f"unknown part {name!r}: {hint} (your own: path/to/part.toml)")
     path = FOLDER / f"{known[_plain(name)]}.toml"
     return read_part(path.name, path.read_text(encoding="utf-8"))
 
 
 def part_path(name: str, folder: Path | None) -> Path:
-    """Where the file of one's own part is; relative to `folder` where that is given."""
+    """Path of a user's part file, relative to `folder` if given."""
     return Path(name) if folder is None else folder / name
 
 
 def read_text(path: Path, files: Mapping[str, str], what: str) -> str:
-    """Text of one's own file, from `files` where it is kept there; ValueError where there is none."""
+    """Text of a user's file, from `files` or from disk; ValueError if there is none."""
     if str(path) in files:
         return files[str(path)]
     try:
@@ -132,16 +132,16 @@ def read_text(path: Path, files: Mapping[str, str], what: str) -> str:
 
 
 def read_toml(file: str, text: str) -> dict[str, Any]:
-    """Contents of the TOML `text`; ValueError that names `file` and where it is wrong."""
+    """Contents of the TOML `text`; ValueError with `file` and the place of the error."""
     try:
         with reading(file):
             return toml(text)
-    except ValueError as error:  # also of a whole number with thousands of digits
+    except ValueError as error:  # also for integers of thousands of digits
         raise ValueError(f"{file}: not TOML: {' '.join(str(error).split())}") from None
 
 
 def read_part(file: str, text: str) -> Part:
-    """The part that the TOML `text` describes; ValueError that begins with `file`."""
+    """The part described by the TOML `text`; errors begin with `file`."""
     data = read_toml(file, text)
     about = {key: _about(file, key, data.pop(key, None)) for key in _ABOUT}
     devices: dict[str, Any] = {}
@@ -166,7 +166,7 @@ def _about(file: str, key: str, value: Any) -> str:
 
 
 def _device(file: str, kind: str, figures: Mapping[str, Any]) -> tuple[Any, dict[str, str]]:
-    """Parameters of one section, and where each of its figures comes from."""
+    """Parameters of one section, and the source of each figure."""
     perfect = PERFECT[kind]
     hints = get_type_hints(type(perfect))
     known = [f.name for f in fields(perfect)]
@@ -191,19 +191,19 @@ def _figure(where: str, figure: Any) -> tuple[Any, str]:
     """Value and source of one figure, ``{ value = 1.0, source = "typical" }``."""
     form = 'write { value = ..., source = "..." }'
     if not isinstance(figure, dict):
-        raise ValueError(f"{shown(where, figure)}: has no source; {form}")
+        raise ValueError(f"{shown(where, figure)}: source missing; {form}")
     if extra := sorted(set(figure) - {"value", "source"}):
         raise ValueError(f"{where}: unknown key {extra[0]!r}; {form}")
     if "value" not in figure:
-        raise ValueError(f"{where}: has no value, {unit_of(where) or 'a number or a word'}; {form}")
+        raise ValueError(f"{where}: value missing, {unit_of(where) or 'a number or a word'}; {form}")
     source = figure.get("source")
     if not isinstance(source, str) or not source.strip():
         raise ValueError(
-            f"{shown(where, figure['value'])}: has no source; name the row of the data sheet, or say typical"
+            f"{shown(where, figure['value'])}: source missing; name the row of the data sheet, or write typical"
         )
     return figure["value"], source
 
 
 def _plain(name: str) -> str:
-    """`name` without case and punctuation: ITG-3200 is itg3200."""
+    """`name` in lower case without punctuation: itg3200 for ITG-3200."""
     return "".join(c for c in name.lower() if c.isalnum())

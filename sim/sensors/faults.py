@@ -1,23 +1,22 @@
-"""Faults of the sensors: what one channel does wrong in one window of time.
+"""Sensor faults: one failure of one channel in one time window.
 
-Faults act on what the sensors report, one after another in the order given, so that two may overlap: a bias and a
-gain compose, and a reading that is stuck is the one last reported before its window, whatever made it.  A fault of
-a sensor that reports now and then (GPS, magnetometer, air data) acts on the reports that arrive in its window and
-leaves what is held between them alone.
+Faults act on the sensor outputs in the order given and may overlap: bias and gain combine, and a stuck reading
+repeats the last output before its window, other faults included.  For a sensor slower than the loop (GPS,
+magnetometer, air data) a fault acts on the reports that arrive in its window, not on values held between reports.
 
-stuck           repeats what was last reported before the window; a GPS repeats its fix with new stamps, and brings
-                none where it had none
-dropout         nothing answers: gyro, accelerometer and air data read zero, a magnetometer brings no new sample
-outage          the same for a GPS: no new fix, the last good one is held
-nan             what arrives is no number
-spikes          a share of the readings is off by an amplitude, up or down; of a GPS, its position in any direction
-bias, gain      readings are off by an amount, or multiplied by a factor
-saturated       reads its full scale, or what the part reads beyond it where it tells an overflow; a barometer's is
-                that of the pressure, so that 1 reads low
+stuck           repeats the last report before the window; a GPS repeats its fix with new time stamps, or gives no
+                fix if it had none
+dropout         no data: gyro, accelerometer and air data read zero, a magnetometer gives no new sample
+outage          no data from a GPS: no new fix, the last good one is held
+nan             readings are NaN
+spikes          a fraction of the readings is off by an amplitude, up or down; of a GPS, its position in any direction
+bias, gain      readings are offset by an amount, or multiplied by a factor
+saturated       reads full scale, or the overflow value if the part has one; a barometer saturates in pressure, so
+                that 1 reads low
 jump            the position of the fixes is displaced
-frozen_course   fixes keep the course last reported, 0 before the first, and their velocity points along it
+frozen_course   fixes keep the last reported course, 0 before the first, and their velocity points along it
 
-A reading that is off stays within the full scale of its part, or overflows as the part does.
+Faulty readings stay within the full scale of the part, or overflow as the part does.
 """
 
 import math
@@ -43,9 +42,9 @@ LATEST_S: Final = 36000.0
 
 
 class Kind(IntEnum):
-    """What goes wrong; the kernel's code for it."""
+    """Kinds of fault, by their code in the kernel."""
 
-    STUCK = 1  # 0 is nothing wrong
+    STUCK = 1  # 0: no fault
     DROPOUT = 2
     NAN = 3
     SPIKES = 4
@@ -58,14 +57,14 @@ class Kind(IntEnum):
 
 
 class _Part(NamedTuple):
-    """A sensor: its code, the unit of its faults and that in SI, its axes, what goes wrong where no value is given."""
+    """A sensor: its code, the unit of its faults and its SI value, number of axes, and default fault values."""
 
     code: int
     unit: str
     si: float
     axes: int
     bias: float
-    spikes: tuple[float, float]  # amplitude, share of the readings
+    spikes: tuple[float, float]  # amplitude, fraction of the readings
 
 
 _GYRO, _ACCELEROMETER, _MAGNETOMETER, _AIRSPEED, _BAROMETER, _GPS = range(6)
@@ -93,34 +92,34 @@ CHANNELS: Final = tuple(
 
 
 def kinds_of(channel: str) -> tuple[str, ...]:
-    """What can go wrong with one of the CHANNELS."""
+    """Kinds of fault of one of the CHANNELS."""
     if channel == "gps":
         return _OF_FIXES
     if channel.startswith("magnetometer."):
-        return tuple(kind for kind in _OF_READINGS if kind != "dropout")  # its axes arrive together or not at all
+        return tuple(kind for kind in _OF_READINGS if kind != "dropout")  # its axes arrive together
     return _OF_READINGS
 
 
 def defaults_of(channel: str, kind: str) -> tuple[float, ...]:
-    """The values of a fault where none are given; as many as it takes."""
+    """Default values of a fault, as many as it takes."""
     part = _PARTS[channel.partition(".")[0]]
     values = {"spikes": part.spikes, "bias": (part.bias,), "gain": (0.5,), "saturated": (1.0,), "jump": (50.0, 0.0)}
     return values.get(kind, ())
 
 
 def unit_of(channel: str) -> str:
-    """Unit of a bias, of spikes, of a jump of `channel`."""
+    """Unit of bias, spikes and jumps of `channel`."""
     return _PARTS[channel.partition(".")[0]].unit
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One fault; its text ``channel:kind=values@from-to`` is what people type, and names its random stream.
+    """One fault.  Its text ``channel:kind=values@from-to``, as typed by users, also names its random stream.
 
-    channel : of CHANNELS                           kind : of `kinds_of` the channel
-    values : spikes amplitude, share of the readings; bias amount; gain factor; saturated +1 or -1; jump metres
-    north, east; in deg/s, g, uT, m/s, m; those not given are `defaults_of`
-    from_s, to_s : since the release; readings at from_s <= t < to_s are wrong, to_s infinite is to the end
+    channel : one of CHANNELS                       kind : one of `kinds_of` the channel
+    values : spikes: amplitude, fraction of the readings; bias: amount; gain: factor; saturated: +1 or -1; jump:
+        metres north, east.  In deg/s, g, uT, m/s or m; `defaults_of` fills in missing ones
+    from_s, to_s : since the release; affects readings at from_s <= t < to_s, to the end if to_s is infinite
     """
 
     channel: str
@@ -133,7 +132,7 @@ class Fault:
         if self.channel not in CHANNELS:
             raise ValueError(f"fault of {self.channel!r}: choose from {', '.join(CHANNELS)}")
         if self.kind not in kinds_of(self.channel):
-            raise ValueError(f"fault of {self.channel}: {self.kind!r} is not {', '.join(kinds_of(self.channel))}")
+            raise ValueError(f"fault of {self.channel}: {self.kind!r}: choose from {', '.join(kinds_of(self.channel))}")
         given = tuple(float(value) for value in self.values)
         defaults = defaults_of(self.channel, self.kind)
         if len(given) > len(defaults):
@@ -154,11 +153,11 @@ class Fault:
         if self.kind == "saturated" and abs(self.values[0]) != 1.0:
             raise ValueError(f"{shown}: must be 1, the upper end of the full scale, or -1, the lower")
         if self.kind == "spikes" and not 0.0 < self.values[1] <= 1.0:
-            raise ValueError(f"{shown}: the second value is the share of the readings, above 0 and at most 1")
+            raise ValueError(f"{shown}: the second value is the fraction of the readings, above 0 and at most 1")
 
     @property
     def part(self) -> str:
-        """The sensor, by its name in the suite."""
+        """Name of the sensor in the suite."""
         return self.channel.partition(".")[0]
 
     @property
@@ -173,7 +172,7 @@ class Fault:
 
 
 def _number(value: float) -> str:
-    """Shortest decimal that reads back as `value`, without an exponent."""
+    """Shortest decimal without exponent that parses to `value`."""
     if not math.isfinite(value):
         return str(value)
     return format(Decimal(repr(float(value))), "f").removesuffix(".0")
@@ -184,28 +183,28 @@ def _numbers(values: Sequence[float]) -> str:
 
 
 def require_possible(fault: Fault, suite: Any) -> None:
-    """Refuse a fault of a part that the parameters `suite` have not, or of a full scale that it has not: ValueError."""
+    """Reject a fault of a part not fitted in `suite`, or saturation of a part without full scale: ValueError."""
     part = getattr(suite, fault.part)
     if part is None:
-        raise ValueError(f"fault {fault}: no {fault.part} is fitted; choose a suite that has one")
+        raise ValueError(f"fault {fault}: no {fault.part} fitted; choose a suite that has one")
     if fault.kind == "saturated" and not math.isfinite(getattr(part, _FULL_SCALES[fault.part])):
         field = f"{fault.part}.{_FULL_SCALES[fault.part]}"
         raise ValueError(
             f"fault {fault}: this {fault.part} has no full scale; set {field} to a finite number of "
-            f"{params.unit_of(field)}, or choose a suite whose {fault.part} has one, or bias"
+            f"{params.unit_of(field)}, choose a suite whose {fault.part} has one, or use bias"
         )
 
 
 FAULT = np.dtype(
     [
-        ("kind", "i8"),  # 0: nothing wrong in this tick
+        ("kind", "i8"),  # 0: no fault in this tick
         ("part", "i8"),
         ("axis", "i8"),
-        ("before", "i8"),  # the row reported last before the window
+        ("before", "i8"),  # last row before the window
         ("value", "f8"),
-        ("least", "f8"),  # the ends of the full scale
+        ("least", "f8"),  # full scale
         ("most", "f8"),
-        ("under", "f8"),  # what is read beyond them
+        ("under", "f8"),  # reading beyond it
         ("over", "f8"),
     ],
     align=True,
@@ -216,10 +215,10 @@ NO_FAULTS = np.zeros((0, 0), FAULT)
 def fault_table(
     faults: Sequence[Fault], release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
 ) -> NDArray[np.void]:
-    """What is wrong in each of `n` ticks, shape (n, m) of FAULT, a column for each axis of each fault; or NO_FAULTS.
+    """Faults of each of `n` ticks, shape (n, m) of FAULT, a column per axis of each fault; or NO_FAULTS.
 
-    release_s : since power-up              source : spikes are drawn from the stream "fault <its text>"
-    unit : shape (1,), the sensors as `Suite` made them
+    release_s : since power-up              source : spikes use the stream "fault <its text>"
+    unit : shape (1,), the sensors of the `Suite`
     """
     columns = [column for fault in faults for column in _columns(fault, source, n)]
     if not columns:
@@ -230,7 +229,7 @@ def fault_table(
         least, most, under, over = _span(fault.part, unit[0])
         kind = Kind[fault.kind.upper()]
         if kind is Kind.SATURATED:
-            high, low = (under, over) if fault.part == "barometer" else (over, under)  # most pressure is least height
+            high, low = (under, over) if fault.part == "barometer" else (over, under)  # in pressure
             values = np.where(values > 0.0, high, low)
         wrong = table[first:end, j]
         hit = _sampled(fault.part, rates, unit[0], n)
@@ -244,12 +243,12 @@ def fault_table(
 
 
 def _first_tick(t_s: float, imu_hz: float, n: int) -> int:
-    """The first of `n` rows whose end is at `t_s` since power-up or later; a nanotick is round-off, not a tick."""
+    """The first of `n` rows that ends at or after `t_s` since power-up; less than a nanotick is round-off."""
     return n if math.isinf(t_s) else min(max(math.ceil(t_s * imu_hz - 1e-9) - 1, 0), n)
 
 
 def _columns(fault: Fault, source: Source, n: int) -> list[tuple[Fault, int, Array]]:
-    """Each axis of a fault, with its value in SI in each of `n` ticks."""
+    """Each axis of a fault, with its SI value in each of `n` ticks."""
     part, letter = _PARTS[fault.part], fault.channel.partition(".")[2]
     axes = ["xyz".index(letter)] if letter else list(range(part.axes))
     if fault.kind == "jump":
@@ -263,14 +262,14 @@ def _columns(fault: Fault, source: Source, n: int) -> list[tuple[Fault, int, Arr
         ways = np.hstack([np.cos(azimuth), np.sin(azimuth)]) if fault.part == "gps" else np.sign(draws[:, 1:] - 0.5)
         return [(fault, axis, hit[:, 0] * ways[:, axis]) for axis in axes]
     if fault.kind == "dropout" and fault.part == "magnetometer":
-        axes = [0]  # its sample is lost as a whole
+        axes = [0]  # the whole sample is lost
     value = fault.values[0] if fault.values else 0.0
     si = part.si if fault.kind == "bias" else 1.0
     return [(fault, axis, np.full(n, value * si)) for axis in axes]
 
 
 def _sampled(part: str, rates: Rates, unit: np.void, n: int) -> NDArray[np.bool_]:
-    """In which of `n` ticks something may be wrong: of air data those with a sample, which the log does not tell."""
+    """Ticks of `n` in which a fault may act: for air data those with a sample, which the log does not mark."""
     steps = int(unit["air"][{"airspeed": "airspeed_steps", "barometer": "baro_steps"}[part]]) if part in _AIR else 1
     end = np.arange(1, n + 1) * rates.steps_per_tick
     sampled: NDArray[np.bool_] = end // steps * steps > end - rates.steps_per_tick
@@ -278,7 +277,7 @@ def _sampled(part: str, rates: Rates, unit: np.void, n: int) -> NDArray[np.bool_
 
 
 def _span(part: str, unit: np.void) -> tuple[float, float, float, float]:
-    """Lowest and highest reading of a part, in SI, and what it reads beyond them; infinite where nothing ends them."""
+    """Lowest and highest reading of a part and its readings beyond them, in SI; infinite if unlimited."""
     least, most = -math.inf, math.inf
     if part in ("gyro", "accelerometer"):
         least, most = quantise(-math.inf, unit[part]), quantise(math.inf, unit[part])
@@ -296,10 +295,10 @@ def _span(part: str, unit: np.void) -> tuple[float, float, float, float]:
 
 @kernel
 def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
-    """Do to the measured row `k` what is wrong in it, in order; `faults` is shape (n, m) of FAULT.
+    """Apply the faults of row `k` in order; `faults` is shape (n, m) of FAULT.
 
-    The bias in the truth is what gyro and accelerometer read without a signal and without noise: a bias is added to
-    it, a gain multiplies it.  All other kinds leave it: it stays that of the part which they hide.
+    The bias in the truth is the reading of gyro and accelerometer without signal and noise: a bias fault adds to it
+    and a gain fault multiplies it; all other kinds leave it unchanged.
     """
     row = measured[k]
     for j in range(faults.shape[1]):
@@ -331,7 +330,7 @@ def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
 
 @kernel
 def _wrong(reading, before, fault):  # type: ignore[no-untyped-def]
-    """What is reported instead of `reading`, where `before` was reported last before the fault's window."""
+    """The faulty value of `reading`; `before` is the last reading before the window of the fault."""
     if fault.kind == Kind.STUCK:
         return before
     if fault.kind == Kind.DROPOUT:
@@ -348,7 +347,7 @@ def _wrong(reading, before, fault):  # type: ignore[no-untyped-def]
 
 @kernel
 def _wrong_bias(bias, fault):  # type: ignore[no-untyped-def]
-    """What the sensor reads without a signal, where it reads `bias` without the fault."""
+    """The reading without signal, `bias` without the fault."""
     if fault.kind == Kind.BIAS:
         return bias + fault.value
     return bias * fault.value if fault.kind == Kind.GAIN else bias
@@ -356,11 +355,11 @@ def _wrong_bias(bias, fault):  # type: ignore[no-untyped-def]
 
 @kernel
 def _spoil_fix(measured, k, fault):  # type: ignore[no-untyped-def]
-    """Do to the fix that has arrived in row `k` what is wrong with it; the columns hold it until the next."""
+    """Apply a fault to the fix that arrives in row `k`; the columns hold it until the next fix."""
     row, before = measured[k], measured[fault.before]
     if fault.kind == Kind.OUTAGE or (fault.kind == Kind.STUCK and not before.gps_valid):
         row.gps_new = 0
-        hold(measured[k - 1], row)  # no fix is so early that it arrives in the very first row
+        hold(measured[k - 1], row)  # no fix arrives in row 0
     elif fault.kind == Kind.STUCK:
         stamp_s = row.gps_t_s
         hold(before, row)
@@ -373,5 +372,5 @@ def _spoil_fix(measured, k, fault):  # type: ignore[no-untyped-def]
         row.gps_course_rad = before.gps_course_rad
         row.gps_v_e_m_s[0] = row.gps_speed_m_s * np.cos(row.gps_course_rad)
         row.gps_v_e_m_s[1] = row.gps_speed_m_s * np.sin(row.gps_course_rad)
-    else:  # a jump, or one spike
+    else:  # jump or spike
         row.gps_p_e_m[fault.axis] += fault.value

@@ -1,9 +1,9 @@
-"""Suites: which parts an aeroplane carries, and the board they sit on; every file ``suites/*.toml`` is one.
+"""Sensor suites: the parts fitted and their board.  Each file ``suites/*.toml`` is one suite.
 
-    summary = "..."                     a line about it
-    gyro = "itg3200"                    a part by name, or a file of one's own: "my_gyro.toml", beside the suite's
+    summary = "..."                     one line of text
+    gyro = "itg3200"                    a part by name, or your own file, relative to the suite: "my_gyro.toml"
     accelerometer = "bma180"
-    gps = "ls20031"                     magnetometer, airspeed and barometer likewise, or not at all
+    gps = "ls20031"                     likewise, optional: magnetometer, airspeed, barometer
 
     [board]                             fields of BoardParams
     lever_arm_b_m = [0.05, 0.0, 0.02]
@@ -12,13 +12,13 @@
     bits = 10
     reference_v = 5.0
 
-    [changes]                           single figures, by dotted names
+    [changes]                           individual figures, by dotted names
     "accelerometer.bias_g" = 0.02
 
-A part ``generic`` has the defaults of its dataclass; a part ``perfect`` has no error.
+The part ``generic`` has the defaults of its dataclass; the part ``perfect`` has no errors.
 
-An installed package offers a suite by an entry point in the group ``wingslevel.suites``: ``my_package:suite.toml``, a
-file in the package, or ``my_package:SUITE``, a path.  Parts in files of their own lie beside it.
+An installed package provides a suite by an entry point in the group ``wingslevel.suites``: ``my_package:suite.toml``, a
+file in the package, or ``my_package:SUITE``, a path.  Its part files are in the same folder.
 """
 
 import os
@@ -45,13 +45,13 @@ from sim.sensors.noise import MOST_BITS
 FOLDER: Final = Path(__file__).parent / "suites"
 NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
 
-_ALWAYS = ("gyro", "accelerometer", "gps")  # no flight without
+_ALWAYS = ("gyro", "accelerometer", "gps")  # required
 _ANALOGUE = {"gyro": ("sensitivity_mv_deg_s", "step_deg_s"), "accelerometer": ("sensitivity_mv_g", "step_g")}
 
 
 @dataclass(frozen=True, slots=True)
 class SuiteParams:
-    """What is fitted, and how good each part is; None is not fitted."""
+    """The parts fitted and their parameters; None: not fitted."""
 
     gyro: GyroParams = field(default_factory=GyroParams)
     accelerometer: AccelerometerParams = field(default_factory=AccelerometerParams)
@@ -63,13 +63,13 @@ class SuiteParams:
 
 
 def load_suite(name: str, files: Mapping[str, str] = NO_FILES) -> SuiteParams:
-    """The suite called `name`, or the one in a file, ``path/to/suite.toml``.
+    """The suite called `name`, or in the file ``path/to/suite.toml``.
 
-    files : path -> text, read instead of the disk: what `own_files` gave when the flight was first flown
+    files : path -> text, used instead of the disk, as returned by `own_files` when the flight was first flown
 
     Raises
     ------
-    ValueError      one line: no such suite (with the near misses) or file, or what is wrong in the file
+    ValueError      one line: no such suite (with suggestions) or file, or what is wrong in the file
     """
     files = _kept(name, files)
     file, data = _read(name, files)
@@ -78,7 +78,7 @@ def load_suite(name: str, files: Mapping[str, str] = NO_FILES) -> SuiteParams:
 
 
 def suite_params(suite: str, changes: Mapping[str, Any], files: Mapping[str, str] = NO_FILES) -> SuiteParams:
-    """The suite of that name with some figures changed, by dotted names; ValueError for a suite or figure not there.
+    """The suite of that name with figures changed by dotted names; ValueError for an unknown suite or figure.
 
     files : path -> text, as for `load_suite`
     """
@@ -87,9 +87,9 @@ def suite_params(suite: str, changes: Mapping[str, Any], files: Mapping[str, str
 
 
 def own_files(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
-    """The text of every file that makes the suite `name`, by path; none for one of wingslevel's own.
+    """The text of each file that defines the suite `name`, by path; empty for a suite shipped with wingslevel.
 
-    The paths of an installed package's suite begin with its name: they are the same on every machine.
+    Paths of the suite of an installed package begin with its name: they are the same on every machine.
     """
     if not name.endswith(".toml"):
         offer = _offered().get(name)
@@ -142,13 +142,13 @@ def _files_of(offer: Offer) -> dict[str, str]:
 
 
 def suite_parts(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, str]:
-    """What is in the suite `name` or in a file, as it is written there: kind -> part, and its summary."""
+    """Contents of the suite `name` or of a file, as written: kind -> part, and the summary."""
     _, data = _read(name, _kept(name, files))
     return {key: data[key] for key in ("summary", *KINDS) if key in data}
 
 
 def suite_settings(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, Any]:
-    """What the suite `name` or a file says of its board, its converter and single figures: dotted name -> value."""
+    """Settings of the suite `name` or of a file for board, converter and figures: dotted name -> value."""
     file, data = _read(name, _kept(name, files))
     board = dict(_table(file, "board", data))
     converter = board.pop("converter", {})
@@ -158,7 +158,7 @@ def suite_settings(name: str, files: Mapping[str, str] = NO_FILES) -> dict[str, 
 
 
 class _Suites(Mapping[str, SuiteParams]):
-    """The suites that have a file here, each read when it is first asked for."""
+    """The shipped suites, each read when first used."""
 
     def __getitem__(self, name: str) -> SuiteParams:
         if name not in _suite_names():
@@ -173,7 +173,7 @@ class _Suites(Mapping[str, SuiteParams]):
 
 
 SUITES: Final[Mapping[str, SuiteParams]] = _Suites()
-"""Every suite that can be named: name -> what is fitted."""
+"""Every shipped suite: name -> parts fitted."""
 
 
 @cache
@@ -187,7 +187,7 @@ def _loaded(name: str) -> SuiteParams:
 
 
 def _read(name: str, files: Mapping[str, str]) -> tuple[str, dict[str, Any]]:
-    """What errors call the suite, and its contents."""
+    """Name of the suite in error messages, and its contents."""
     if name.endswith(".toml"):
         return name, read_toml(name, read_text(Path(name), files, "sensor suite"))
     if name not in _suite_names():
@@ -233,23 +233,23 @@ def _table(file: str, key: str, data: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _device(file: str, kind: str, name: Any, folder: Path | None, files: Mapping[str, str]) -> Any:
-    """Parameters of the part `name`, None where none is fitted."""
+    """Parameters of the part `name`, None if not fitted."""
     if name is None and kind not in _ALWAYS:
         return None
     if not isinstance(name, str):
         said = f"{kind} is missing" if name is None else f"{kind} = {name!r}"
-        raise ValueError(f"{file}: {said}: must be the name of a part, or of a file of one's own")
+        raise ValueError(f"{file}: {said}: must be the name of a part, or of your own part file")
     try:
         part = load_part(name, folder, files)
     except ValueError as error:
         raise ValueError(f"{file}: {kind}: {error}") from None
     if kind not in part.devices:
-        raise ValueError(f"{file}: {kind} = {name!r}: that part has no {kind}, but {' and '.join(part.devices)}")
+        raise ValueError(f"{file}: {kind} = {name!r}: that part has no {kind}, only {' and '.join(part.devices)}")
     return part.devices[kind]
 
 
 def _read_by(file: str, kind: str, device: Any, converter: Any) -> Any:
-    """An analogue part read by the board's converter: one step is reference / 2^bits / sensitivity."""
+    """An analogue part on the board's converter, whose step is reference / 2^bits / sensitivity."""
     if device.output == "digital":
         return device
     known = ("bits", "reference_v", "conversions")

@@ -1,11 +1,10 @@
-"""GPS receiver: what it is like, and the errors of its fixes, drawn ahead; `sim.sensors.receiver` makes the fixes.
+"""GPS receiver: its parameters and the errors of its fixes, drawn before the flight; see `sim.sensors.receiver`.
 
-position error = wander + white + jumps      velocity error = white + wander      lost, or not
+position error = wander + white + jumps      velocity error = white + wander
 
 Wanders are first-order Gauss-Markov processes.  An outage begins and ends at random (the two-state chain of
-Gilbert, Capacity of a burst-noise channel, 1960): times with and without satellites are exponential.  A jump
-is a sudden offset, as where another set of satellites comes into use, which then decays exponentially.
-Whatever is off by default is exactly zero.
+Gilbert, Capacity of a burst-noise channel, 1960): times with and without satellites are exponential.  A jump is
+a sudden offset, as when the receiver switches satellites, which then decays exponentially.
 """
 
 import math
@@ -19,7 +18,7 @@ from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.clock import Rates
 from sim.place import metres_per_degree
-from sim.sensors.noise import Source, gauss_markov, require
+from sim.sensors.noise import Source, gauss_markov, lag_weights, require
 
 Resolution = Literal["none", "nmea", "binary"]
 Course = Literal["velocity", "positions"]
@@ -31,28 +30,30 @@ KNOT_M_S: Final = 1852.0 / 3600.0
 class GpsParams:
     """Behaviour of a GPS receiver.  The defaults are a small 4 Hz receiver.
 
-    rate_hz : its report rate, which a flight takes unless it names another (`Rates.gps_hz` is what counts)
-    filter_s : time constant of the filter on position and velocity; 0 is none
-    latency_s : from the time a fix is true until it arrives
-    first_fix_s : time since power-up before which there is no fix
-    velocity_noise_m_s : sigma of the white noise of each velocity component of a fix
-    wander_horizontal_m, wander_vertical_m : sigma of the slowly wandering error of position, per axis
-    wander_s : correlation time of that error
-    noise_horizontal_m, noise_vertical_m : sigma of the white noise of position, per axis
-    velocity_wander_m_s : sigma of the wandering error of each velocity component
-    velocity_wander_s : its correlation time
-    first_fix_spread_s : the first fix comes up to this much later, at random, all times alike: a cold start
-        waits for an ephemeris, which the satellites repeat every 30 s (IS-GPS-200)
-    resolution : of the messages: none, nmea (RMC and GGA) or binary (UBX NAV-PVT); see `sim.sensors.receiver`
-    minute_decimals : of latitude and longitude in NMEA, 4 or 5
-    course : velocity and course from the receiver's velocity, or from its last three positions
-    hold_below_m_s : static navigation, below this speed position and course are held; 0 is off
-    smoothing_s : time constant of track smoothing; 0 is off
-    outage_every_s : mean time with satellites between two outages; infinite is never
-    outage_s : mean length of an outage
-    jump_every_s : mean time between two jumps of position; infinite is never
-    jump_horizontal_m, jump_vertical_m : sigma of a jump, per axis
-    jump_decay_s : time constant with which a jump goes back
+    A larger figure is a worse receiver unless stated otherwise, and 0 removes that effect.
+
+    rate_hz : report rate, used by a flight that sets no GPS rate (Hz, default 4).  Higher: fresher fixes
+    filter_s : time constant of the filter on position and velocity (s, default 1)
+    latency_s : from the validity time of a fix to its arrival (s, default 0.3)
+    first_fix_s : time since power-up of the first fix (s, default 1)
+    first_fix_spread_s : the first fix is late by up to this, uniformly (s, default 0); a cold start waits for an
+        ephemeris, which satellites repeat every 30 s (IS-GPS-200)
+    velocity_noise_m_s : sigma of the white noise of each velocity component (m/s, default 0.1)
+    velocity_wander_m_s : sigma of the correlated error of each velocity component (m/s, default 0)
+    velocity_wander_s : correlation time of that error (s, default 10).  Higher: averages out more slowly
+    wander_horizontal_m, wander_vertical_m : sigma of the correlated position error per axis (m, default 1.5 and 2.5)
+    wander_s : correlation time of that error (s, default 30).  Higher: averages out more slowly
+    noise_horizontal_m, noise_vertical_m : sigma of the white position noise per axis (m, default 0)
+    resolution : of the messages: none, nmea (RMC and GGA) or binary (UBX NAV-PVT) (default none)
+    minute_decimals : of latitude and longitude in NMEA, 4 or 5 (default 4).  Higher: finer position
+    course : velocity and course from the receiver's velocity, or from its last three positions (default velocity)
+    hold_below_m_s : static navigation: position and course are held below this speed (m/s, default 0: off)
+    smoothing_s : time constant of track smoothing (s, default 0: off)
+    outage_every_s : mean time between outages (s, default inf: none).  Lower: more outages
+    outage_s : mean length of an outage (s, default 5)
+    jump_every_s : mean time between position jumps (s, default inf: none).  Lower: more jumps
+    jump_horizontal_m, jump_vertical_m : sigma of a jump per axis (m, default 5 and 8)
+    jump_decay_s : time constant with which a jump decays (s, default 20)
     """
 
     rate_hz: float = 4.0
@@ -81,12 +82,13 @@ class GpsParams:
     jump_decay_s: float = 20.0
 
     def __post_init__(self) -> None:
-        require(self, "s", "filter_s", "latency_s", "first_fix_s", "first_fix_spread_s", "smoothing_s")
-        require(self, "m/s", "velocity_noise_m_s", "velocity_wander_m_s", "hold_below_m_s")
-        require(self, "m", "wander_horizontal_m", "wander_vertical_m", "noise_horizontal_m", "noise_vertical_m")
-        require(self, "m", "jump_horizontal_m", "jump_vertical_m")
-        require(self, "s", "wander_s", "velocity_wander_s", "outage_s", "jump_decay_s", least=0.001)
-        require(self, "Hz", "rate_hz", least=0.1)
+        require(
+            self, "filter_s", "latency_s", "first_fix_s", "first_fix_spread_s", "smoothing_s", "velocity_noise_m_s",
+            "velocity_wander_m_s", "hold_below_m_s", "wander_horizontal_m", "wander_vertical_m", "noise_horizontal_m",
+            "noise_vertical_m", "jump_horizontal_m", "jump_vertical_m",
+        )  # fmt: skip
+        require(self, "wander_s", "velocity_wander_s", "outage_s", "jump_decay_s", least=0.001)
+        require(self, "rate_hz", least=0.1)
         for name in ("outage_every_s", "jump_every_s"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"GpsParams.{name} = {getattr(self, name)!r} s: choose a number above 0, or infinity")
@@ -111,41 +113,34 @@ UNIT = np.dtype(
         ("steps_per_fix", "i8"),
         ("latency_steps", "i8"),
         ("first_fix_step", "i8"),
-        ("plain", "i8"),  # a fix is reported as it comes out of the filter: none of what follows
+        ("plain", "i8"),  # fixes leave the filter as they are: none of what follows
         ("smoothing_s", "f8"),
         ("hold_below_m_s", "f8"),
         ("from_positions", "i8"),
-        ("polar", "i8"),  # velocity is told as speed and course alone
-        ("p_step_m", "f8", (3,)),  # resolutions; 0 is none
+        ("polar", "i8"),  # velocity is reported as speed and course only
+        ("p_step_m", "f8", (3,)),  # resolutions; 0: none
         ("v_step_m_s", "f8"),
         ("speed_step_m_s", "f8"),
-        ("course_steps", "f8"),  # in a full circle; 0 is not quantised
+        ("course_steps", "f8"),  # in a full circle; 0: not quantised
     ],
     align=True,
 )
 NOISE = (
-    ("gps_v_noise_e_m_s", "f8", (3,)),  # white and wandering
-    ("gps_p_wander_e_m", "f8", (3,)),  # wandering, white, and what is left of the jumps
+    ("gps_v_noise_e_m_s", "f8", (3,)),  # white noise and wander
+    ("gps_p_wander_e_m", "f8", (3,)),  # wander, white noise and jumps
     ("satellites_lost", "i8"),  # 1 in an outage
 )
 
 
 def _whole_steps(time_s: float, physics_hz: int) -> int:
-    """Physics steps after which `time_s` has passed; a nanostep is round-off, not a step."""
+    """Physics steps after which `time_s` has passed; less than a nanostep is round-off."""
     return math.ceil(time_s * physics_hz - 1e-9)
 
 
 def make(params: GpsParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
-    """Make one receiver: set its constants in `unit`, shape (1,) of UNIT.
-
-    The weights are the exact solution of the filter for a true value that is linear within the tick:
-    y1 = a y0 + (1 - a - b) u0 + b u1 with a = exp(-dt / T), b = 1 - (1 - a) T / dt.
-    """
-    step = rates.dt_s / params.filter_s if params.filter_s > 0.0 else math.inf
-    before = math.exp(-step)
-    end = 1.0 + math.expm1(-step) / step
+    """Make one receiver: set its constants in `unit`, shape (1,) of UNIT."""
     unit["filter_s"] = params.filter_s
-    unit["before"], unit["start"], unit["end"] = before, 1.0 - before - end, end
+    unit["before"], unit["start"], unit["end"] = lag_weights(params.filter_s, rates.dt_s)
     unit["physics_hz"] = rates.physics_hz
     unit["steps_per_tick"], unit["steps_per_fix"] = rates.steps_per_tick, rates.steps_per_fix
     unit["latency_steps"] = _whole_steps(params.latency_s, rates.physics_hz)
@@ -181,7 +176,7 @@ def _set_resolution(params: GpsParams, unit: NDArray[np.void]) -> None:
 
 
 def draw(params: GpsParams, rates: Rates, source: Source, noise: NDArray[np.void]) -> None:
-    """Draw the errors of every tick into the columns NOISE of `noise`; a fix has those of its own tick."""
+    """Draw the errors of every tick into the columns NOISE of `noise`; a fix uses those of its tick."""
     n, dt_s = len(noise), rates.dt_s
     sigma_m = np.array([params.wander_horizontal_m, params.wander_horizontal_m, params.wander_vertical_m])
     steps = source("gps wander").standard_normal((n, 3))
@@ -204,9 +199,9 @@ def draw(params: GpsParams, rates: Rates, source: Source, noise: NDArray[np.void
 
 
 def _jumps(params: GpsParams, dt_s: float, source: Source, n: int) -> Array:
-    """Offset of position by jumps in each of `n` ticks, shape (n, 3).
+    """Position offset by jumps in each of `n` ticks, shape (n, 3).
 
-    At most one a tick; the variance settles at sigma^2 decay / (2 every) (Campbell's theorem).
+    At most one jump per tick; the variance settles at sigma^2 decay / (2 every) (Campbell's theorem).
     """
     sigma_m = np.array([params.jump_horizontal_m, params.jump_horizontal_m, params.jump_vertical_m])
     size_m = sigma_m * source("gps jump sizes").standard_normal((n, 3))
@@ -225,7 +220,7 @@ def _decay(x, phi):  # type: ignore[no-untyped-def]
 
 @kernel
 def _outages(chance, lose, find):  # type: ignore[no-untyped-def]
-    """1 in the ticks without satellites, from uniform `chance` and the probabilities of a change in a tick."""
+    """1 in ticks without satellites, from uniform `chance` and the probabilities of a change per tick."""
     lost = np.zeros(len(chance), np.int64)
     for k in range(1, len(chance)):
         lost[k] = 1 - (chance[k] < find) if lost[k - 1] else chance[k] < lose

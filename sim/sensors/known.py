@@ -1,7 +1,7 @@
-"""What the data sheets of a sensor suite say of its instruments: the record that goes to flight code.
+"""The instruments of a sensor suite according to their data sheets: the record passed to flight code.
 
-Only parameters of the parts and the board count here, never what was drawn from them for one flight.  Several small
-effects that a filter cannot tell apart are one figure: their root sum of squares.
+It uses only the parameters of parts and board, never the errors drawn for one flight.  Small effects that a filter
+cannot distinguish are combined into one figure, their root sum of squares.
 """
 
 import math
@@ -16,14 +16,14 @@ from sim.sensors.fitting import SuiteParams
 from sim.sensors.gps import KNOT_M_S, GpsParams
 from sim.sensors.gyro import GyroParams
 
-UNIFORM = math.sqrt(12.0)  # standard deviation of a value that is uniform over one step is the step over this
+UNIFORM = math.sqrt(12.0)  # step / standard deviation of a value uniform over one step
 NMEA_SPEED_STEP_M_S, UBX_SPEED_STEP_M_S = 0.01 * KNOT_M_S, 0.001
 
 
 def data_sheets(suite: SuiteParams, rates: Rates, origin: str = "") -> dict[str, Known]:
-    """What is known of the instruments of `suite` at the `rates` of a flight, by the names of `PROPERTIES`.
+    """Properties of the instruments of `suite` at the `rates` of a flight, by the names of `PROPERTIES`.
 
-    origin : what the suite is called      Source of every entry: "data sheet"
+    origin : name of the suite      The source of each entry is "data sheet".
     """
     figures = {
         **_receiver(suite.gps, rates),
@@ -38,7 +38,7 @@ def data_sheets(suite: SuiteParams, rates: Rates, origin: str = "") -> dict[str,
 
 
 def has_clean_magnetometer(suite: SuiteParams) -> bool:
-    """Whether a magnetometer is fitted that needs no calibration: no iron, no motor, no crooked mounting."""
+    """Whether a magnetometer is fitted that needs no calibration: no iron, motor field or misalignment."""
     part = suite.magnetometer
     if part is None:
         return False
@@ -47,9 +47,9 @@ def has_clean_magnetometer(suite: SuiteParams) -> bool:
 
 
 def _receiver(gps: GpsParams, rates: Rates) -> dict[str, float | bool]:
-    """The receiver: two first-order lags in series delay like one with the sum of their time constants.
+    """The receiver: two first-order lags in series count as one with the sum of their time constants.
 
-    A velocity worked out from three positions is as old as the middle one, a fix interval before the stamp.
+    A velocity from three positions is valid at the middle one, a fix interval before the stamp.
     """
     from_positions = gps.course == "positions"
     step_m_s = {"none": 0.0, "nmea": NMEA_SPEED_STEP_M_S, "binary": UBX_SPEED_STEP_M_S}[gps.resolution]
@@ -67,9 +67,9 @@ def _receiver(gps: GpsParams, rates: Rates) -> dict[str, float | bool]:
 
 
 def _gyro(gyro: GyroParams, board: BoardParams, rates: Rates) -> dict[str, float]:
-    """The gyro: a calibration at rest removes the bias at power-up, and not what comes later.
+    """The gyro: calibration at rest removes the turn-on bias, but not later changes.
 
-    Crooked mounting is to a filter what the part's own cross-axis sensitivity is.
+    Mounting misalignment acts on a filter like cross-axis sensitivity.
     """
     noise = _density(gyro, gyro.noise_density_deg_s_sqrt_hz, gyro.step_deg_s, gyro.range_deg_s, rates)
     at_power_up_deg_s = 0.0 if board.rest_s > 0.0 else gyro.bias_deg_s
@@ -88,7 +88,7 @@ def _gyro(gyro: GyroParams, board: BoardParams, rates: Rates) -> dict[str, float
 
 
 def _accelerometer(part: AccelerometerParams, board: BoardParams, rates: Rates) -> dict[str, float]:
-    """The accelerometer: in steady flight gain, cross axes and mounting act on 1 g, and look like a bias."""
+    """The accelerometer: in steady flight gain, cross axes and misalignment act on 1 g and look like a bias."""
     noise = _density(part, 1e-6 * part.noise_density_ug_sqrt_hz, part.step_g, part.range_g, rates)
     biases_g = part.bias_g, 1e-3 * part.bias_per_k_mg * board.warming_k, part.gain, part.cross_axis
     return {
@@ -103,16 +103,16 @@ def _mounting_rad(board: BoardParams) -> float:
 
 
 def _analogue(output: str, figure: float) -> float:
-    """A figure that counts for parts with an analogue output alone: what the supply does to them."""
+    """A figure that applies only to analogue outputs: the effect of the supply."""
     return 0.0 if output == "digital" else figure
 
 
 def _density(
     part: GyroParams | AccelerometerParams, density_sqrt_hz: float, step: float, full_scale: float, rates: Rates
 ) -> float:
-    """One-sided noise density of the samples: that of the part, of what folds down from above, and of its converter.
+    """One-sided noise density of the samples: of the part including aliasing, and of its converter.
 
-    A white noise with the standard deviation sigma in every sample of dt has the density sigma sqrt(2 dt).
+    White noise with the standard deviation sigma per sample of dt has the density sigma sqrt(2 dt).
     """
     _, folded = noise_filter(part.bandwidth_hz, part.conversions, rates.imu_hz)
     of_one = noise_of_one_conversion(density_sqrt_hz, part.bandwidth_hz, part.conversions, rates.imu_hz)

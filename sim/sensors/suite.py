@@ -28,31 +28,23 @@ from sim.sensors.receiver import receive
 
 UNIT = np.dtype(
     [
-        ("dt_s", "f8"),
-        ("board", board.UNIT),
-        ("gyro", gyro.UNIT),
-        ("accelerometer", accelerometer.UNIT),
-        ("gps", gps.UNIT),
-        ("magnetometer", magnetometer.UNIT),
-        ("air", air_data.UNIT),
+        ("dt_s", "f8"), ("board", board.UNIT), ("gyro", gyro.UNIT), ("accelerometer", accelerometer.UNIT),
+        ("gps", gps.UNIT), ("magnetometer", magnetometer.UNIT), ("air", air_data.UNIT),
     ],
     align=True,
-)
+)  # fmt: skip
 NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.NOISE, *air_data.NOISE], align=True)
 MEMORY = np.dtype(
     [
-        ("board", board.MEMORY),
-        ("gyro", gyro.MEMORY),
-        ("accelerometer", accelerometer.MEMORY),
-        ("gps", receiver.MEMORY),
-        ("air", air_data.MEMORY),
+        ("board", board.MEMORY), ("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY),
+        ("gps", receiver.MEMORY), ("air", air_data.MEMORY),
     ],
     align=True,
-)
+)  # fmt: skip
 
 
 class Snapshot(NamedTuple):
-    """All that makes these sensors these: the units fitted, the errors drawn, the memory; the rest is in the log."""
+    """The state of a suite: units, drawn errors, memory and faults; the rest is in the log."""
 
     unit: NDArray[np.void]
     noise: NDArray[np.void]
@@ -63,8 +55,7 @@ class Snapshot(NamedTuple):
 class Suite:
     """The sensors of flight number `flight` of the campaign `seed`, with `faults`.
 
-    The times of faults count from the release, `release_s` after power-up.  Errors are drawn in `reset`.  Filters
-    remember in one record what rows of the log cannot tell.
+    Fault times count from the release, `release_s` after power-up.  Errors are drawn in `reset`.
     """
 
     def __init__(
@@ -76,7 +67,7 @@ class Suite:
         for what in ("magnetometer", "airspeed", "barometer"):
             part = getattr(params, what)
             if part is not None:
-                rates.steps_per_sample(what, part.rate_hz)  # refused here, before the flight
+                rates.steps_per_sample(what, part.rate_hz)  # rejected here, before the flight
         self.params = params
         self.rates = rates
         self._source = partial(stream, seed, flight)
@@ -89,14 +80,11 @@ class Suite:
         self._faults = NO_FAULTS
 
     def reset(self, log: Log) -> None:
-        """Power up: draw the errors of a flight as long as `log`, whose rows `measure` fills from 0 on."""
+        """Power up: draw the errors of a flight as long as `log`, whose rows `measure` fills from row 0."""
         self._truth, self._measured = log.truth, log.measured
-        # Flight code is shown a copy: whoever makes that writeable changes nothing of what is recorded.
+        # Flight code gets a view of a copy: even if it makes that writeable, or reshapes it, the recording is safe.
         copy = np.zeros(len(log), MEASURED_DTYPE)
-        self._seen, self._shown = (
-            copy.view(),
-            copy.view(),
-        )  # two, for flight code could change even the shape of its own
+        self._seen, self._shown = copy.view(), copy.view()
         self._shown.flags.writeable = False
         p, rates, source = self.params, self.rates, self._source
         unit, noise = np.zeros(1, UNIT), np.zeros(len(log), NOISE)
@@ -118,25 +106,25 @@ class Suite:
         self._faults = fault_table(self.faults, self._release_s, rates, source, unit, len(log))
 
     def measure(self, k: int) -> Measurements:
-        """Measure tick `k`, whose truth row is complete; a read-only view of a copy of its row.
+        """Measure tick `k`, whose truth row is complete; returns a read-only view of a copy of its row.
 
         Raises
         ------
         IndexError      the log has no row `k`, or there is no log yet
         """
         _measure(self._truth, self._measured, self._seen, self._noise, k, self._unit, self._memory, self._faults)
-        return tuple.__new__(Measurements, (self._shown, k))  # spares the constructor's Python: 0.15 us
+        return tuple.__new__(Measurements, (self._shown, k))  # skips the constructor, 0.15 us
 
     def snapshot(self) -> Snapshot:
-        """What `restore` needs to go on; none of its arrays is changed later."""
+        """The state for `restore`; its arrays are never changed later."""
         return Snapshot(self._unit, self._noise, self._memory.copy(), self._faults)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Be the sensors of `snapshot` from the next tick on; call `reset` with the log first."""
+        """Continue from `snapshot` at the next tick; call `reset` with the log first."""
         if len(snapshot.noise) < len(self._truth):
             raise ValueError(
                 f"snapshot of {len(snapshot.noise)} ticks: the log has {len(self._truth)} ticks; "
-                "choose one taken in a flight at least as long"
+                "choose a snapshot of a flight at least as long"
             )
         self._unit, self._noise, self._faults = snapshot.unit, snapshot.noise, snapshot.faults
         self._memory = snapshot.memory.copy()

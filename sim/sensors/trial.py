@@ -1,6 +1,6 @@
-"""Trials of single sensors: hours at rest, a manoeuvre, a step and a turn, each against a truth in closed form.
+"""Trials of single sensors: hours at rest, a manoeuvre, a step and a turn, each against closed-form truth.
 
-They run through the sensors that fly, `draw` of the modules and `Suite.measure`, with no aeroplane around them.
+They use the same code as a flight, `draw` of the modules and `Suite.measure`, without an aeroplane.
 """
 
 import math
@@ -29,21 +29,21 @@ from sim.sensors.gps import GpsParams
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.suite import Suite, SuiteParams
 
-FLIGHTS: Final = 22  # of three axes: 66 hours at rest, of which the mean curve scatters by an eighth of one's
+FLIGHTS: Final = 22  # of three axes: 66 hours at rest; the mean curve has an eighth of the scatter of one
 HOUR_S: Final = 3600.0
 IMU_HZ: Final = 50
 SEED: Final = 0
 WORKERS: Final = 2
-SETTLED_S: Final = 12.0  # time given to a receiver, beside its own delays
-PHASES: Final = 8  # of a change between two reports
-REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: what a first-order lag reaches in its time constant
+SETTLED_S: Final = 12.0  # settling time for a receiver, besides its own delays
+PHASES: Final = 8  # of a change relative to the reports
+REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: reached by a first-order lag after one time constant
 
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """How a gyro or an accelerometer is simulated at rest, and which fields of its parameters say what.
+    """Simulation of a gyro or an accelerometer at rest, and the names of its noise parameters.
 
-    unit : of the page      scale : of that unit, per SI      columns : of the errors drawn, bias and noise
+    unit : of the report      scale : from SI to that unit      columns : of the drawn errors, bias and noise
     """
 
     module: Any
@@ -69,7 +69,7 @@ INERTIAL: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """One coefficient as simulated and as the data sheet has it, None where that is silent."""
+    """One coefficient as simulated and as in the data sheet, None if not specified there."""
 
     measured: float
     datasheet: float | None
@@ -77,7 +77,7 @@ class Coefficient:
 
     @property
     def difference(self) -> float | None:
-        """Relative difference of the measured one."""
+        """Relative difference of the simulated value from the data sheet."""
         return self.measured / self.datasheet - 1.0 if self.datasheet else None
 
     def to_json(self) -> dict[str, Any]:
@@ -86,13 +86,13 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class AtRest:
-    """A gyro or an accelerometer that has lain still, before its converter and without warming up.
+    """A gyro or an accelerometer at rest, before its converter and without warm-up.
 
     tau_s : (n,)      variances : (n, axes), Allan variances in the square of `unit`
     noise : fitted to their mean
-    figures : noise density, bias instability and random walk of the part file, zero where that is silent
-    step : of a reading, the averaging of conversions included; 0 where nothing is quantised
-    noise_gain : sigma of the white noise of a reading, against that before low-pass filter and conversions
+    figures : noise density, bias instability and random walk of the part file, zero if not specified
+    step : of a reading, the averaging of conversions included; 0 if not quantised
+    noise_gain : sigma of the white noise of a reading, relative to that before low-pass filter and conversions
     """
 
     kind: str
@@ -113,7 +113,7 @@ class AtRest:
 
     @property
     def coefficients(self) -> dict[str, Coefficient]:
-        """White noise, flicker noise, random walk, by their names in the JSON."""
+        """White noise, flicker noise and random walk by their names in the JSON."""
         m, unit = self.noise, self.unit
         density, flicker, walk = (figure or None for figure in self.figures)
         return {
@@ -124,12 +124,12 @@ class AtRest:
 
     @property
     def sample_sigma(self) -> float:
-        """Sigma of the white noise of one reading, what folds down from above the sample rate included."""
+        """Sigma of the white noise of one reading, aliasing included."""
         return self.noise_gain * self.noise.white * math.sqrt(IMU_HZ)
 
     @property
     def walk_is_hidden(self) -> bool:
-        """Whether the stated random walk makes less than a quarter of the variance of the longest average."""
+        """Whether the stated random walk is less than a quarter of the variance of the longest average."""
         longest_s = float(self.tau_s[-1])
         return self.stated.walk > 0.0 and self.stated.walk**2 * longest_s / 3.0 < 0.25 * float(self.deviation[-1]) ** 2
 
@@ -140,12 +140,12 @@ class AtRest:
 
 
 def at_rest(
-    kind: str, params: Any, flights: int = FLIGHTS, seconds: float = HOUR_S, told: Callable[[], None] = lambda: None
+    kind: str, params: Any, flights: int = FLIGHTS, seconds: float = HOUR_S, done: Callable[[], None] = lambda: None
 ) -> AtRest:
-    """Simulate `flights` records of three axes and of `seconds`; `told` is called after each."""
+    """Simulate `flights` records of three axes, `seconds` long; `done` is called after each."""
     how, rates = INERTIAL[kind], Rates(imu_hz=IMU_HZ)
     if kind == "gyro":
-        params = replace(params, drift_deg_s_min=0.0)  # a ramp is how a gyro warms up
+        params = replace(params, drift_deg_s_min=0.0)  # the ramp models warm-up
     n = rates.ticks(seconds)
     m = allan.octaves(n)
 
@@ -156,10 +156,10 @@ def at_rest(
         return allan.variance(signal, m)
 
     found = []
-    with ThreadPoolExecutor(WORKERS) as pool:  # random numbers are drawn outside Python's lock
+    with ThreadPoolExecutor(WORKERS) as pool:  # NumPy draws without holding the interpreter lock
         for variances in pool.map(record, range(flights)):
             found.append(variances)
-            told()
+            done()
     tau_s, variances = m / IMU_HZ, np.concatenate(found, axis=1)
     hours = variances.shape[1] * seconds / 3600.0
     _, noise_gain = noise_filter(params.bandwidth_hz, params.conversions, IMU_HZ)
@@ -170,13 +170,13 @@ def at_rest(
 
 
 def figures(kind: str, params: Any) -> tuple[float, float, float]:
-    """Noise density, bias instability and random walk of a gyro or an accelerometer, in the unit of the page."""
+    """Noise density, bias instability and random walk of a gyro or an accelerometer, in the unit of the report."""
     how = INERTIAL[kind]
     return getattr(params, how.density), getattr(params, how.instability), getattr(params, how.walk)
 
 
 def step(kind: str, params: Any) -> float:
-    """Step of a reading, in the unit of the page, as the part is made."""
+    """Step of a reading, in the unit of the report."""
     how, unit = INERTIAL[kind], np.zeros(1, INERTIAL[kind].module.UNIT)
     how.module.make(params, BoardParams(), Rates(imu_hz=IMU_HZ), partial(stream, SEED, 0), unit)
     return how.scale * float(unit["step"][0])
@@ -184,9 +184,9 @@ def step(kind: str, params: Any) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Exercise:
-    """Level flight, a pull-up to 2.5 g, a roll to 60 deg and one back; each change of rate and force is a sine squared.
+    """Level flight, a pull-up to 2.5 g (1 to 2 s), a roll to 60 deg (3 to 4 s) and back (4.5 to 5.5 s).
 
-    The pull-up lasts from 1 to 2 s, the rolls from 3 to 4 s and from 4.5 to 5.5 s.
+    Each change of rate and force is a sine squared.
     """
 
     pull_m_s2: float = 1.5 * G_M_S2
@@ -220,7 +220,7 @@ def _pulse(t_s: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True, slots=True)
 class SpeedStep:
-    """North at `before_m_s`, at once at `after_m_s` from `when_s` on."""
+    """North at `before_m_s`, stepping to `after_m_s` at `when_s`."""
 
     when_s: float
     before_m_s: float = 5.0
@@ -237,7 +237,7 @@ class SpeedStep:
 
 @dataclass(frozen=True, slots=True)
 class QuarterTurn:
-    """North, from `when_s` on to the right, until the course is east."""
+    """North, then from `when_s` a right turn to east."""
 
     when_s: float
     speed_m_s: float = 12.0
@@ -257,7 +257,7 @@ class QuarterTurn:
 
 
 def _level(north: Array, east: Array, speed: Array | float, course: Array, rate: Array) -> Kinematics:
-    """Level motion with the wings level and the nose on course."""
+    """Level motion, wings level, nose along the course."""
     still, sine, cosine = np.zeros_like(north), np.sin(course), np.cos(course)
     return Kinematics(
         from_euler(still, still, course),
@@ -269,13 +269,13 @@ def _level(north: Array, east: Array, speed: Array | float, course: Array, rate:
 
 
 def fitted(devices: Mapping[str, Any]) -> SuiteParams:
-    """A suite of `devices`, kind -> parameters; gyro, accelerometer and GPS are perfect where not named."""
+    """A suite of `devices`, kind -> parameters; gyro, accelerometer and GPS are perfect if not given."""
     always = {kind: PERFECT[kind] for kind in ("gyro", "accelerometer", "gps")}
     return SuiteParams(**(always | dict(devices)))
 
 
 def check_rates(devices: Mapping[str, Any]) -> None:
-    """Refuse a sensor that reports at a rate which the trials' clock has not: ValueError."""
+    """Reject a sensor rate that does not divide the clock of the trials: ValueError."""
     rates = Rates(imu_hz=IMU_HZ)
     for kind, params in devices.items():
         if kind == "gps":
@@ -300,17 +300,17 @@ class _QuietSuite(Suite):
 
 
 def exercise(devices: Mapping[str, Any]) -> Log:
-    """The exercise as gyro and accelerometer report it."""
+    """The exercise as measured by gyro and accelerometer."""
     return fly(fitted(devices), Exercise(), Exercise.seconds, Rates(imu_hz=IMU_HZ))
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """How a receiver follows a step of speed and a quarter turn, without its noise.
+    """Response of a receiver to a speed step and a quarter turn, without its noise.
 
-    speed_delay_s, course_delay_s : from when the truth has done 63 % of the change until a report says so, the
-    mean over steps at all times between two reports
-    least_speed_m_s : the least that is reported in the turn      step, turn : one flight of each
+    speed_delay_s, course_delay_s : from 63 % of the change in truth to 63 % in the reports, mean over steps at all
+        phases of the report interval
+    least_speed_m_s : lowest speed reported in the turn      step, turn : one flight of each
     when_s : start of both changes in those
     """
 
@@ -323,7 +323,7 @@ class Response:
 
 
 def respond(params: GpsParams) -> Response:
-    """Try a receiver on a step of speed and on a turn."""
+    """Fly a receiver through speed steps and turns."""
     rates = Rates(imu_hz=IMU_HZ, gps_hz=params.rate_hz)
     suite = fitted({"gps": replace(params, first_fix_s=0.0)})
     lag_s = params.filter_s + params.latency_s
@@ -346,7 +346,7 @@ def respond(params: GpsParams) -> Response:
 
 
 def _reaches(log: Log, value: Array, level: float, since_s: float) -> float:
-    """Seconds from `since_s` until `value` is at `level` or above; infinite where it never is."""
+    """Seconds from `since_s` until `value` reaches `level`; infinite if never."""
     t_s = log.truth["t_s"]
     there = (t_s > since_s) & (value >= level)
     return float(t_s[np.argmax(there)]) - since_s if there.any() else math.inf
@@ -354,9 +354,9 @@ def _reaches(log: Log, value: Array, level: float, since_s: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class MagneticTrial:
-    """Two level turns in the earth's field, without a motor, and the heading that follows from the readings.
+    """Two level turns in the earth's field, motor off, and the heading computed from the readings.
 
-    field_e_ut : of the earth, shape (3,)      truth_deg, error_deg : of the heading, of every sample, shape (n,)
+    field_e_ut : of the earth, shape (3,)      truth_deg, error_deg : heading and its error per sample, shape (n,)
     readings_ut : shape (n, 3)
     """
 
@@ -388,7 +388,7 @@ class Spin:
 
 
 def turn_around(params: MagnetometerParams) -> MagneticTrial:
-    """Turn a magnetometer twice round on the level, its latency left out; heading by the two level components."""
+    """Turn a magnetometer twice around, level, without latency; heading from the horizontal components."""
     suite = fitted({"magnetometer": replace(params, latency_s=0.0)})
     log = fly(suite, Spin(), 40.0, Rates(imu_hz=IMU_HZ))
     new = log.measured["mag_new"] == 1
@@ -402,7 +402,7 @@ def turn_around(params: MagnetometerParams) -> MagneticTrial:
 
 @dataclass(frozen=True, slots=True)
 class Surge:
-    """North, airspeed and height swinging about 12 m/s and 60 m by 5 m/s and 10 m, once in 20 s; the nose level."""
+    """North, nose level: airspeed 12 +- 5 m/s and height 60 +- 10 m, with a period of 20 s."""
 
     phase: ClassVar[Phase] = Phase.FLYING
     wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
@@ -422,12 +422,12 @@ class Surge:
 
 @dataclass(frozen=True, slots=True)
 class AirTrial:
-    """A minute of airspeed and height that swing, as air-data sensors report them."""
+    """A minute of oscillating airspeed and height as measured by air-data sensors."""
 
     log: Log
 
     def errors(self, kind: str) -> Array:
-        """Reading less truth of every sample, m/s or m."""
+        """Reading minus truth of each sample, m/s or m."""
         new = self.log.measured["air_new"] == 1
         truth, measured = self.log.truth[new], self.log.measured[new]
         if kind == "airspeed":
@@ -436,5 +436,5 @@ class AirTrial:
 
 
 def swing(devices: Mapping[str, Any]) -> AirTrial:
-    """Try airspeed sensor and barometer out."""
+    """Fly an airspeed sensor and a barometer."""
     return AirTrial(fly(fitted(devices), Surge(), 60.0, Rates(imu_hz=IMU_HZ)))

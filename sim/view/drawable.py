@@ -1,6 +1,6 @@
-"""A log of which everything can be drawn: what no viewer can show is left out, or held at what was shown before.
+"""A log made safe for drawing: values that no viewer can show are left out or held.
 
-A recording may hold anything that an estimator returned, or that somebody wrote into it since.
+A recording may contain any value that an estimator returned, or that was edited into it later.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from estimator.interface import Array
 from sim.log import Log
 
-LARGEST = 1e30  # single precision, in which the viewer draws, holds no more than 3e38
+LARGEST = 1e30  # the viewer draws in single precision, up to 3e38
 FARTHEST_M = 1e8
 _CONTROLS = ("aileron", "elevator", "rudder", "throttle")
 
@@ -17,8 +17,8 @@ _CONTROLS = ("aileron", "elevator", "rudder", "throttle")
 def drawable(log: Log) -> Log:
     """A copy of `log` that a viewer can show.
 
-    Numbers beyond all reason are NaN, a matrix that is no rotation is level to the north, a place that is none is the
-    one before it, and unknown velocities and controls are 0.
+    Huge numbers become NaN, matrices that are not rotations level and north, invalid positions the last valid one,
+    and unknown velocities and controls 0.
     """
     with np.errstate(invalid="ignore", over="ignore"):
         truth, measured, flown = (_finite(rows) for rows in (log.truth, log.measured, log.flown))
@@ -45,8 +45,8 @@ def _finite(rows: NDArray[np.void]) -> NDArray[np.void]:
 
 
 def is_rotation(R_eb: Array) -> NDArray[np.bool_]:
-    """Which of the matrices, shape (n, 3, 3), are rotations, to a tenth."""
-    small = np.where(np.abs(R_eb) < 2.0, R_eb, np.nan)  # the square of what is larger may overflow
+    """Which of the matrices, shape (n, 3, 3), are rotations, within 0.1."""
+    small = np.where(np.abs(R_eb) < 2.0, R_eb, np.nan)  # larger squares may overflow
     known = np.abs(small @ small.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0) < 0.1
     known &= np.linalg.det(np.where(known[:, None, None], small, np.eye(3))) > 0.0
     return np.asarray(known)

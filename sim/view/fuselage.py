@@ -7,8 +7,8 @@ import numpy as np
 from estimator.interface import Array
 from sim.view.loft import Mesh, finished, loft
 
-# Along the fuselage, nose to tail: fraction of the length, of the width, of the height; and how far the centre line
-# has risen to the tailplane.  With a motor in the nose, and without.
+# Along the fuselage, nose to tail: fractions of length, width and height; and rise of the centre line towards the
+# tailplane.  With a motor in the nose, and without.
 _POWERED = np.array(
     [
         (0.000, 0.40, 0.34, 0.00),

@@ -1,4 +1,4 @@
-"""Closed surfaces skinned over rings of points, and the aerofoil sections that the rings of a wing are made of."""
+"""Closed surfaces over rings of points, and the aerofoil sections used as rings of a wing."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from estimator.interface import Array
 
-_AFT, _FORE, _NOSE = 4, 9, 9  # points of a section: along the hinged part, ahead of it, round its nose
-_WEDGE = 0.15  # how far the face of the fixed part bulges, of half the thickness: flat, it would have no inside
-_NOSE_FILLS = 0.9  # of the thickness at the hinge: the rounded nose of a hinged part turns inside the fixed one
+_AFT, _FORE, _NOSE = 4, 9, 9  # points of a section: on the hinged part, ahead of it, around its nose
+_WEDGE = 0.15  # bulge of the face of the fixed part over half the thickness; a flat face would have no inside
+_NOSE_FILLS = 0.9  # of the thickness at the hinge: the rounded nose of the hinged part
 
 
 class Mesh(NamedTuple):
@@ -29,8 +29,8 @@ class Section(NamedTuple):
 
     Each ring runs from the trailing edge over the top to the nose and back along the bottom.
 
-    whole, fixed, hinged : shape (k, 2), the aerofoil, what is left of it ahead of the hinge, and the rest
-    axis : shape (2,), the hinge, half-way between top and bottom
+    whole, fixed, hinged : shape (k, 2), the aerofoil, its part ahead of the hinge, and the hinged part
+    axis : shape (2,), the hinge, midway between top and bottom
     """
 
     whole: Array

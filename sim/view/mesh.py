@@ -1,8 +1,8 @@
-"""The shape of an aeroplane for the eye, made from the ``[geometry]`` table of its ``airframe.toml``.
+"""The drawn shape of an aeroplane, from the ``[geometry]`` table of its ``airframe.toml``; not used by the physics.
 
-A handful of closed lofts in body axes (x forward, y right, z down, origin at the centre of gravity): aerofoils
-along the span, rounded sections along the fuselage, a thin disc for the propeller.  Ailerons, elevator and rudder
-are parts of their own that turn about their hinge lines.  Physics never sees it.
+Closed lofts in body axes (x forward, y right, z down, origin at the centre of gravity): aerofoils along the span,
+rounded sections along the fuselage, a thin disc for the propeller.  Ailerons, elevator and rudder are separate parts
+that turn about their hinge lines.
 """
 
 import tomllib
@@ -22,22 +22,22 @@ KEYS = (
 )  # fmt: skip
 STRAIGHT_WING = ("span_m", "root_chord_m", "tip_chord_m", "dihedral_deg")
 PANELS = ("panel_y_m", "panel_chord_m", "panel_dihedral_deg")
-THROW_DEG = 25.0  # of a control surface at full deflection, where the geometry has no <control>_throw_deg
+THROW_DEG = 25.0  # of a control surface at full deflection, if the geometry has no <control>_throw_deg
 
-# Where the geometry says nothing: fraction of the chord that moves, and of the half span between which ailerons lie.
+# Defaults: fraction of the chord that moves, and ends of the ailerons as fractions of the half span.
 _PART = {"aileron": 0.24, "elevator": 0.40, "rudder": 0.45}
 _AILERON_SPAN = (0.54, 0.92)
 
 _TIP = np.array([(0.0, 1.0), (0.45, 0.955), (0.75, 0.82), (0.93, 0.60), (1.0, 0.34)])  # outward, chord left
 _SOFT_TIP = np.array([(0.0, 1.0), (0.5, 0.96), (0.8, 0.87), (0.95, 0.74), (1.0, 0.60)])  # of tailplane and fin
-_CLEAR_M = 0.0025  # between the ends of a control surface and what is beside it
-_RUDDER_FOOT = 0.16  # of the fin's height: the elevator swings below
+_CLEAR_M = 0.0025  # gap beside the ends of a control surface
+_RUDDER_FOOT = 0.16  # fraction of the fin height below the rudder, for the elevator to move
 
 _AIRCRAFT = Path(__file__).parents[1] / "aircraft"
 
 
 class Hinge(NamedTuple):
-    """How a part follows its control.
+    """The hinge of a control surface.
 
     control : column of the log, -1..1     throw_rad : deflection at 1
     point_m : shape (3,), on the hinge line     axis : shape (3,), unit, along it; the part turns about it, right-handed
@@ -49,9 +49,9 @@ class Hinge(NamedTuple):
     axis: Array
 
     def pose(self, deflection: Array) -> tuple[Array, Array]:
-        """Where deflections, shape (n,), put the part: translations (n, 3) and quaternions (n, 4), scalar last.
+        """Pose at deflections of shape (n,): translations (n, 3) and quaternions (n, 4), scalar last.
 
-        Turning about a line that misses the origin displaces by p - R p (Rodrigues' formula for R p).
+        Rotation about a line through p displaces the origin by p - R p (Rodrigues' formula for R p).
         """
         angle = self.throw_rad * np.asarray(deflection, np.float64)[:, None]
         p, k = self.point_m, self.axis
@@ -61,34 +61,33 @@ class Hinge(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A part of the aeroplane; `hinge` is None where it is fixed to the body."""
+    """A part of the aeroplane; `hinge` is None if it is fixed."""
 
     mesh: Mesh
     hinge: Hinge | None = None
 
 
 def geometry_of(aircraft: str) -> dict[str, Any]:
-    """The ``[geometry]`` table of the named aeroplane; ValueError where there is no such aeroplane."""
+    """The ``[geometry]`` table of the named aeroplane; ValueError if there is no such aeroplane."""
     path = _AIRCRAFT / aircraft / "airframe.toml"
     if not path.is_file():
-        raise ValueError(f"no geometry of aircraft {aircraft!r}: there is no {path}")
+        raise ValueError(f"no geometry of aircraft {aircraft!r}: {path} does not exist")
     return dict(tomllib.loads(path.read_text(encoding="utf-8"))["geometry"])
 
 
 def aeroplane(geometry: Mapping[str, Any]) -> dict[str, Part]:
-    """The parts of the aeroplane that `geometry` describes, by name; left and right ones are parts of their own.
+    """The parts of the aeroplane described by `geometry`, by name; left and right ones are separate.
 
     Parameters
     ----------
     geometry    the ``[geometry]`` table of an ``airframe.toml``.  ``wing_x_m``, ``wing_z_m`` place the quarter
                 chord of the wing root, ``tail_arm_m`` (positive aft) that of tailplane and fin, ``tail_z_m`` the
-                height of both; the fuselage, its middle at ``fuselage_z_m``, runs aft from ``nose_x_m``, where
-                the propeller turns.  The wing is
-                straight (``span_m``, ``root_chord_m``, ``tip_chord_m``, ``dihedral_deg``) or made of panels
-                (``panel_y_m`` and ``panel_chord_m`` at their ends, root first, ``panel_dihedral_deg`` of each).
-                ``aileron_part``, ``elevator_part``, ``rudder_part`` of the chord move, about hinges with
-                ``aileron_throw_deg`` and so on; ``aileron_y_m`` is where the right aileron begins and ends.
-                No part of the chord means no such control, no diameter no propeller
+                height of both; the fuselage, centred at ``fuselage_z_m``, extends aft from ``nose_x_m``, the
+                position of the propeller.  The wing is straight (``span_m``, ``root_chord_m``, ``tip_chord_m``,
+                ``dihedral_deg``) or made of panels (``panel_y_m`` and ``panel_chord_m`` at their ends, root first,
+                ``panel_dihedral_deg`` of each).  ``aileron_part``, ``elevator_part``, ``rudder_part`` are the
+                fractions of the chord that move, by up to ``aileron_throw_deg`` and so on; ``aileron_y_m`` are the
+                ends of the right aileron.  A part of 0 means no such control, a diameter of 0 no propeller
 
     Raises
     ------
@@ -96,7 +95,7 @@ def aeroplane(geometry: Mapping[str, Any]) -> dict[str, Part]:
     """
     g = _checked(geometry)
     half_height = 0.5 * g["fuselage_height_m"]
-    # Where nothing says how high the fuselage is, it carries the wing.
+    # By default the fuselage carries the wing.
     carries_z_m = float(np.clip(0.0, g["wing_z_m"] - half_height, g["wing_z_m"] + half_height))
     centre_z_m = float(geometry.get("fuselage_z_m", carries_z_m))
     tail_z_m = float(geometry.get("tail_z_m", centre_z_m - 0.5 * half_height))
@@ -115,7 +114,7 @@ def aeroplane(geometry: Mapping[str, Any]) -> dict[str, Part]:
 
 
 def _checked(geometry: Mapping[str, Any]) -> dict[str, float]:
-    """The lengths and angles that every aeroplane has."""
+    """The lengths and angles required for every aeroplane."""
     return {key: _length(geometry, key) for key in KEYS}
 
 
@@ -151,10 +150,10 @@ def _panels(geometry: Mapping[str, Any]) -> tuple[Array, Array, Array]:
 
 
 class _Blade(NamedTuple):
-    """Half a wing, half a tailplane, a fin: sections at the fractions `t` of the way from its root to its tip.
+    """Half a wing or tailplane, or a fin: sections at the fractions `t` from root to tip.
 
-    points_m : shape (n, 3), where the fraction `pivot` of the chord lies     chord_m : shape (n,)
-    lift : shape (3,), the direction in which the section's heights count     creases : fractions with an edge
+    points_m : shape (n, 3), of the fraction `pivot` of the chord     chord_m : shape (n,)
+    lift : shape (3,), direction of positive section heights          creases : fractions with an edge
     """
 
     t: Array
@@ -173,14 +172,14 @@ class _Blade(NamedTuple):
         return point_m[:, None, :] + chord_m * (forward + np.outer(profile[:, 1], self.lift))
 
     def fixed(self, cut: tuple[float, float] | None) -> Array:
-        """Rings of what does not move, root to tip; between the fractions of `cut` without the hinged part."""
+        """Rings of the fixed part, root to tip; without the hinged part between the fractions of `cut`."""
         s = self.section
         start, end = cut or (2.0, 2.0)
         rings = []
         for t in np.unique(np.concatenate((self.t, [f for f in (start, end) if f <= 1.0]))):
             whole, hollow = (self.at(np.array([t]), p) for p in (s.whole, s.fixed))
             if t == start:
-                rings += [whole, whole, hollow, hollow]  # each twice: an edge at the wall between the two
+                rings += [whole, whole, hollow, hollow]  # twice each, for an edge
             elif t == end and t < 1.0:
                 rings += [hollow, hollow, whole, whole]
             else:
@@ -188,7 +187,7 @@ class _Blade(NamedTuple):
         return np.concatenate(rings)
 
     def hinged(self, control: str, cut: tuple[float, float], sign: float, throw_rad: float) -> Part:
-        """What moves between the fractions of `cut`; `sign` is of the rotation about the line from root to tip."""
+        """The moving part between the fractions of `cut`; `sign` of the rotation about the line from root to tip."""
         length_m = float(np.linalg.norm(self.points_m[-1] - self.points_m[0]))
         clear = _CLEAR_M / length_m
         start, end = cut[0] + clear, cut[1] - (clear if cut[1] < 1.0 else 0.0)
@@ -199,23 +198,23 @@ class _Blade(NamedTuple):
         return Part(loft(rings), Hinge(control, throw_rad, line[0], sign * along / np.linalg.norm(along)))
 
     def mirrored(self) -> "_Blade":
-        """The same on the other side."""
+        """The mirror image on the other side."""
         return self._replace(points_m=self.points_m * [1.0, -1.0, 1.0])
 
 
 def _controlled(geometry: Mapping[str, Any], control: str) -> tuple[float, float]:
-    """Part of the chord that moves with a control, and how far it turns at 1, radians."""
+    """Fraction of the chord that moves with a control, and its deflection at 1, radians."""
     part = float(geometry.get(f"{control}_part", _PART[control]))
     throw_deg = float(geometry.get(f"{control}_throw_deg", THROW_DEG))
     if not 0.0 <= part <= 0.8:
-        raise ValueError(f"geometry {control}_part = {part:g} is not a part of the chord from 0 to 0.8")
+        raise ValueError(f"geometry {control}_part = {part:g} is not a fraction of the chord from 0 to 0.8")
     if part > 0.0 and not 0.0 < throw_deg < 90.0:
         raise ValueError(f"geometry {control}_throw_deg = {throw_deg:g} is not an angle between 0 and 90 deg")
     return part, float(np.radians(throw_deg))
 
 
 def _wing(g: Mapping[str, float], panels: tuple[Array, Array, Array], geometry: Mapping[str, Any]) -> dict[str, Part]:
-    """Wing, tip to tip, each panel straight at the quarter chord, tips rounded; ailerons where it has them."""
+    """Wing, tip to tip, panels with straight quarter chord, rounded tips; ailerons if it has them."""
     y_m, chord_m, rise_m = panels
     joints = y_m / y_m[-1]
     round_from = max(1.0 - 0.6 * chord_m[-1] / y_m[-1], 0.5 + 0.5 * joints[-2])
@@ -232,7 +231,7 @@ def _wing(g: Mapping[str, float], panels: tuple[Array, Array, Array], geometry: 
         return {"wing": Part(loft(_both(right, None)))}
     span = np.array(geometry.get("aileron_y_m", np.multiply(_AILERON_SPAN, y_m[-1])), np.float64)
     if span.shape != (2,) or not 0.0 < span[0] < span[1] < y_m[-1]:
-        raise ValueError(f"geometry aileron_y_m = {span.tolist()} m must be two places between 0 and {y_m[-1]:g} m")
+        raise ValueError(f"geometry aileron_y_m = {span.tolist()} m must be two positions between 0 and {y_m[-1]:g} m")
     cut = float(span[0] / y_m[-1]), float(span[1] / y_m[-1])
     return {
         "wing": Part(loft(_both(right, cut))),
@@ -242,7 +241,7 @@ def _wing(g: Mapping[str, float], panels: tuple[Array, Array, Array], geometry: 
 
 
 def _both(right: _Blade, cut: tuple[float, float] | None) -> Array:
-    """Rings of the fixed part from the left tip to the right one, with an edge in the middle."""
+    """Rings of the fixed part from left tip to right tip, with an edge in the middle."""
     rings = right.fixed(cut)
     return np.concatenate((rings[::-1] * [1.0, -1.0, 1.0], rings))
 
@@ -250,7 +249,7 @@ def _both(right: _Blade, cut: tuple[float, float] | None) -> Array:
 def _tapered(
     root_e_m: Array, tip_e_m: Array, chord_m: float, taper: float, part: float, default: float, lift: tuple[float, ...]
 ) -> _Blade:
-    """A blade from root to tip, straight where it is hinged, softly rounded."""
+    """A blade from root to tip with a straight hinge line and rounded tip."""
     t = np.concatenate(([0.0], 0.55 + 0.45 * _SOFT_TIP[:, 0]))
     chord = chord_m * (1.0 + (taper - 1.0) * t)
     chord[1:] *= _SOFT_TIP[:, 1]
@@ -260,7 +259,7 @@ def _tapered(
 
 
 def _tailplane(g: Mapping[str, float], tail_z_m: float, geometry: Mapping[str, Any]) -> dict[str, Part]:
-    """Tailplane and the two halves of the elevator, which go up together."""
+    """Tailplane and the two halves of the elevator."""
     part, throw_rad = _controlled(geometry, "elevator")
     root = np.array([-g["tail_arm_m"], 0.0, tail_z_m])
     tip = root + np.array([0.0, 0.5 * g["tail_span_m"], 0.0])
@@ -276,7 +275,7 @@ def _tailplane(g: Mapping[str, float], tail_z_m: float, geometry: Mapping[str, A
 
 
 def _fin(g: Mapping[str, float], tail_z_m: float, geometry: Mapping[str, Any]) -> dict[str, Part]:
-    """Fin, upright, and its rudder."""
+    """Fin and rudder."""
     part, throw_rad = _controlled(geometry, "rudder")
     root = np.array([-g["tail_arm_m"], 0.0, tail_z_m])
     blade = _tapered(

@@ -1,7 +1,7 @@
-"""What the plots of a flight show: angles, errors and signals made from the log, in the units people read.
+"""The plots of a flight: angles, errors and signals from the log, in convenient units.
 
-One colour means one thing everywhere: orange the truth, blue the estimate (and what is known aboard), green a
-sensor's reading (blue-green one of the air data), grey a demand.
+Colours have the same meaning everywhere: orange truth, blue estimate and command, green sensor (blue-green air data),
+grey demand.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ _INCLINATION: Colour = (240, 90, 150)
 _HEADING: Colour = (170, 130, 255)
 _COURSE: Colour = (255, 215, 130)
 
-_STEEPEST_R_ZX, _SLOWEST_M_S = 0.9, 3.0  # beyond these a heading means nothing; as the metrics have it
+_STEEPEST_R_ZX, _SLOWEST_M_S = 0.9, 3.0  # limits of a meaningful heading, as in the metrics
 
 
 class Curve(NamedTuple):
@@ -35,7 +35,7 @@ class Curve(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """One plot: where its data are, what it is called, and its lines."""
+    """One plot: path of its data, title and lines."""
 
     path: str
     title: str
@@ -77,10 +77,10 @@ PLOTS = tuple(plot for page in PAGES.values() for plot in page)
 
 
 def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
-    """What every plot shows: plot path -> shape (ticks, lines of the plot), NaN where there is nothing to draw.
+    """Data of each plot: path -> shape (ticks, lines of the plot), NaN for gaps.
 
-    Angles in degrees; a line that leaps from one end of the circle to the other is interrupted.  The heading error
-    is against what the estimator's heading converges to, the true course or the true nose.
+    Angles in degrees, with gaps where they wrap around.  The heading error is relative to what the estimator's heading
+    converges to, the true course or the true nose.
     """
     truth, measured, flown = log.truth, log.measured, log.flown
     v_e_m_s = truth["v_e_m_s"]
@@ -98,7 +98,7 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
     fixed = measured["gps_valid"] > 0
     sampled, aired = np.cumsum(measured["mag_new"]) > 0, np.cumsum(measured["air_new"]) > 0
     pitot_m_s, baro_m = (np.where(aired, measured[c], np.nan) for c in ("airspeed_m_s", "baro_height_m"))
-    # A flight to the north is shown from -180 to 180, one to the south from 0 to 360: fewer leaps.
+    # Headings around north are shown from -180 to 180, around south from 0 to 360, to avoid wrapping.
     cut_rad = -np.pi if np.mean(truth["R_eb"][:, 0, 0]) > 0.0 else 0.0
     bank_rad = flown["bank_demand_rad"], true_rad[0], estimated_rad[0]
     columns: dict[str, tuple[Any, ...]] = {
@@ -129,9 +129,9 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
 
 
 def limits(log: Log, lines: dict[str, Array]) -> dict[str, Range]:
-    """Range of every plot's vertical axis: all that `lines` hold, and two powers of ten at least to read it by.
+    """Range of the vertical axis of each plot: all values of `lines`, and at least two axis labels.
 
-    An error counts from when the estimator knows its attitude: the start would hide the rest.
+    Errors count only after the estimator has started, as the initial ones would hide the rest.
     """
     started = log.flown["health"] != Health.STARTING
     found = {}
@@ -144,14 +144,14 @@ def limits(log: Log, lines: dict[str, Array]) -> dict[str, Range]:
         margin = 0.06 * max(high - low, 1e-3)
         low, high = low - margin, high + margin
         step = 10.0 ** np.floor(np.log10(high - low))
-        if np.floor(high / step) - np.ceil(low / step) < 1.0:  # the viewer labels its multiples alone
+        if np.floor(high / step) - np.ceil(low / step) < 1.0:  # the viewer labels only multiples of it
             low, high = (np.floor(low / step) - 0.05) * step, (np.ceil(high / step) + 0.05) * step
         found[path] = float(low), float(high)
     return found
 
 
 def _circle_deg(angle_rad: Array, cut_rad: float) -> Array:
-    """Degrees from the cut once round, with a gap at every leap (no aeroplane turns 90 degrees in a tick)."""
+    """Degrees from the cut upwards, with a gap at each wrap (no aeroplane turns 90 degrees in a tick)."""
     angle_deg = np.degrees((angle_rad - cut_rad) % (2.0 * np.pi) + cut_rad)
     angle_deg[1:][np.abs(np.diff(angle_deg)) > 90.0] = np.nan
     return angle_deg

@@ -1,11 +1,11 @@
-"""A flight to look at: the Rerun recording of truth beside estimate, and the viewer that shows it.
+"""The Rerun recording of a flight, truth and estimate together, written afterwards or streamed live.
 
-`write` makes a ``.rrd`` in bulk after the flight, with the layout of the viewer inside; `LiveView` streams the same
-in blocks while flying.  Times are seconds since the release, negative before it.  No
-wall clock goes into a recording: the same flight gives the same data.
+`write` makes a ``.rrd`` file after the flight, viewer layout included; `LiveView` streams the same data in blocks
+during the flight.  Times are seconds since the release, negative before it.  A recording contains no wall-clock
+time: the same flight gives the same data.
 
-The estimated aeroplane is drawn at the true position, so that what one sees between the two is attitude error
-alone.  The chase view follows the path, not the nose: its horizon stays level, and bank and pitch are seen.
+The estimated aeroplane is drawn at the true position, so that the visible difference is pure attitude error.  The
+chase view follows the path, not the nose: its horizon stays level, so that bank and pitch are visible.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -26,39 +26,37 @@ from sim.outside.wording import printable
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
 from sim.recording import RecordingError, digest, replacing
 from sim.view.drawable import drawable
+from sim.view.layout import TIMELINE, blueprint, extent
 from sim.view.loft import Mesh
 from sim.view.mesh import Part, aeroplane, geometry_of
-from sim.view.plots import ESTIMATE, PAGES, PLOTS, TRUTH, Colour, Curve, Plot, Range, curves, limits
+from sim.view.plots import ESTIMATE, PLOTS, TRUTH, Colour, curves, limits
 from sim.view.story import setting, story
 from sim.view.viewer import Viewer as Viewer
 from sim.view.viewer import open_viewer as open_viewer
 
 if TYPE_CHECKING:
     import rerun as rr
-    import rerun.blueprint as rrb
 
     _When = Callable[[Any], list[rr.TimeColumn]]
 
-TIMELINE = "sim_time"
 CONTROLS = ("aileron", "elevator", "rudder")
 
-_SKY: Colour = (118, 146, 170)
 _GROUND: Colour = (66, 84, 66)
 _GRID: Colour = (92, 112, 90)
 _WIND: Colour = (120, 220, 230)
-_LARGE = 0.05  # the overview shows the aeroplane larger, by this times the reach in metres, or nobody would find it
-_WIDTHS = (2.4, 1.7, 1.2, 1.2)  # of the lines of a plot: a lower one is seen beside those that cover it
-_TRACK_HZ, _MAP_HZ = 25.0, 10.0  # the drawn tracks; the aeroplane on the map
-_STEP_RAD = np.radians(0.5)  # a control surface is drawn within this of where it is
-_GHOST, _THINNEST, _DENSER = 105, 10.0, 80.0  # opacity of 255: the estimate; the propeller at no throttle, more at full
+_LARGE = 0.05  # scale of the aeroplane in the overview, per metre of extent
+_WIDTHS = (2.4, 1.7, 1.2, 1.2)  # of the lines of a plot: lower ones stay visible below the others
+_TRACK_HZ, _MAP_HZ = 25.0, 10.0  # of tracks; of the aeroplane on the map
+_STEP_RAD = np.radians(0.5)  # resolution of control surface positions
+_GHOST, _THINNEST, _DENSER = 105, 10.0, 80.0  # opacity of 255: estimate; propeller at idle; added at full throttle
 _PALE = 0.75
 _FOOTER = 32  # bytes: offset and length of the index, its checksum, ``RRF2FOOT`` and a one
-_FLUSH_S = 120.0  # longest that Rerun may take to encode
-_CHASE_S = 1.5  # the chase view follows the path smoothed over about so long
+_FLUSH_S = 120.0  # limit for encoding
+_CHASE_S = 1.5  # smoothing time of the path that the chase view follows
 _LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
 _LANE_COLOURS: dict[str, dict[str, Colour]] = {
     "phase": {"held": (90, 95, 105), "thrown": (190, 140, 50), "flying": (45, 110, 125), "resting": (90, 95, 105)},
-    # By hand grey, held blue, led green; a failsafe is amber, and red where nobody knows the attitude.
+    # Manual grey, attitude modes blue, navigation green; failsafes amber, red if the attitude is unknown.
     "mode": {
         "manual": (90, 95, 105),
         "rate": (110, 105, 130),
@@ -82,7 +80,7 @@ def write(flight: Flight, path: str | Path) -> Path:
 
     Raises
     ------
-    RecordingError    where the system refuses to write
+    RecordingError    the file cannot be written
     """
     path = Path(path)
     with replacing(path) as temporary:
@@ -93,13 +91,13 @@ def write(flight: Flight, path: str | Path) -> Path:
 def _encoded(flight: Flight, path: Path) -> bytes:
     """The Rerun recording of `flight`, for a file at `path`.
 
-    Made in memory and written by us: Rerun's own writing to a file reports a full disk in its log alone.
+    Made in memory and written by us: Rerun reports a full disk only in its log.
     """
     scene, log = Scene.of(flight.manifest, flight.release_s, flight.heading_reference), drawable(flight.log)
     rec = _stream(flight.manifest, digest(flight)[:16])
     lines = curves(log, flight.heading_reference) if len(log) else {}
-    stream = rec.binary_stream()  # type: ignore[misc] # attached to the class as a function of another module
-    layout = _blueprint(log, flight.release_s, limits(log, lines))
+    stream = rec.binary_stream()  # type: ignore[misc] # attached to the class by another module
+    layout = blueprint(log, flight.release_s, limits(log, lines))
     rec.send_blueprint(layout, make_active=False, make_default=True)
     _send_fixed(rec, scene)
     _send_rows(rec, scene, log, lines, 0)
@@ -110,12 +108,12 @@ def _encoded(flight: Flight, path: Path) -> bytes:
         raise RecordingError(f"cannot write to {path}: Rerun cannot encode it ({error})") from error
     rec.disconnect()
     if not _is_complete(data):
-        raise RecordingError(f"cannot write to {path}: Rerun has encoded a part of it alone")
+        raise RecordingError(f"cannot write to {path}: Rerun encoded only a part of it")
     return data
 
 
 def _is_complete(data: bytes) -> bool:
-    """Whether the bytes of a Rerun recording end in its footer, and that lies where it says."""
+    """Whether the bytes of a Rerun recording end in a consistent footer."""
     end = data[-_FOOTER:]
     return (
         end[20:28] == b"RRF2FOOT"
@@ -124,9 +122,9 @@ def _is_complete(data: bytes) -> bool:
 
 
 class LiveView:
-    """Streams a flight to a viewer while it is flown: call it with the log and the number of rows filled so far.
+    """Streams a flight to a viewer while it is flown: call it with the log and the number of rows filled.
 
-    url : of the viewer's gRPC server, see `Viewer`     manifest, release_s, heading_reference : as of the `Flight`
+    url : gRPC server of the viewer, see `Viewer`     manifest, release_s, heading_reference : as in `Flight`
     """
 
     def __init__(
@@ -135,17 +133,17 @@ class LiveView:
         self._scene = Scene.of(manifest, release_s, heading_reference)
         self._sent = 0
         self._rec = _stream(manifest, None)
-        self._rec.connect_grpc(url, default_blueprint=_blueprint(None, 0.0, {}))
+        self._rec.connect_grpc(url, default_blueprint=blueprint(None, 0.0, {}))
         _send_fixed(self._rec, self._scene)
 
     def __call__(self, log: Log, n_rows: int) -> None:
-        """Send the rows that are new."""
+        """Send the new rows."""
         so_far = log.until(n_rows)
         _send_rows(self._rec, self._scene, so_far, curves(so_far, self._scene.heading_reference), self._sent)
         self._sent = n_rows
 
     def close(self, flight: Flight) -> None:
-        """Send what is left of `flight`, its events and its story."""
+        """Send the remaining rows of `flight`, its events and its story."""
         self(flight.log, len(flight.log))
         _send_end(self._rec, flight)
         self._rec.flush()
@@ -154,9 +152,9 @@ class LiveView:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What is drawn and where, beside the rows of the log.
+    """The fixed parts of the scene.
 
-    parts : the aeroplane     place : latitude and longitude of the launch point, degrees
+    parts : of the aeroplane     place : latitude and longitude of the launch point, degrees
     """
 
     parts: dict[str, Part]
@@ -166,7 +164,7 @@ class Scene:
 
     @classmethod
     def of(cls, manifest: Mapping[str, Any], release_s: float, heading_reference: HeadingReference) -> "Scene":
-        """The scene of a flight with `manifest`; an aeroplane without a geometry is drawn as the `endurance`."""
+        """The scene of a flight with `manifest`; an aircraft without geometry is drawn as the `endurance`."""
         try:
             geometry = geometry_of(str(setting(manifest, "aircraft", "endurance")))
         except ValueError:
@@ -195,12 +193,12 @@ def _stream(manifest: Mapping[str, Any], recording_id: str | None) -> "rr.Record
 
 
 def _send_fixed(rec: "rr.RecordingStream", scene: Scene) -> None:
-    """What never moves: ground, launch point, the shapes of the aeroplanes, the names and colours of the lines."""
+    """Send what never changes: ground, launch point, aircraft shapes, names and colours of the lines."""
     import rerun as rr
 
     rec.log("world", rr.ViewCoordinates.FRD, static=True)  # north, east, down
     far = 4000.0
-    steps = np.arange(-1000.0, 1001.0, 50.0)  # short segments: a long one is drawn as thick as its far end needs
+    steps = np.arange(-1000.0, 1001.0, 50.0)  # short segments, as line width is constant within one
     along = [np.column_stack((steps, np.full_like(steps, s), np.zeros_like(steps))) for s in steps]
     across = [strip[:, [1, 0, 2]] for strip in along]
     grid = rr.LineStrips3D(along + across, colors=_GRID, radii=rr.Radius.ui_points(0.5))
@@ -234,7 +232,7 @@ def _send_fixed(rec: "rr.RecordingStream", scene: Scene) -> None:
 
 
 def _painted(mesh: Mesh, name: str, colour: Colour, alpha: int | None = None) -> "rr.Mesh3D":
-    """The mesh in its colours: pale fuselage and control surfaces, dark below, so that one sees which side is up."""
+    """The coloured mesh: pale fuselage and control surfaces, dark underside to show which side is up."""
     import rerun as rr
 
     base = np.array(colour, np.float64)
@@ -253,7 +251,7 @@ def _painted(mesh: Mesh, name: str, colour: Colour, alpha: int | None = None) ->
 
 
 def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, lines: Mapping[str, Array], start: int) -> None:
-    """The rows of `log` and of the `lines` of its plots from `start` on; the tracks anew as a whole."""
+    """Send the rows of `log` and of its plot `lines` from `start` on; tracks are sent again as a whole."""
     import rerun as rr
 
     if start >= len(log):
@@ -295,7 +293,7 @@ def _send_rows(rec: "rr.RecordingStream", scene: Scene, log: Log, lines: Mapping
 
 
 def _send_moving(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int, when: "_When") -> None:
-    """Where the control surfaces are, whenever one has moved by a step; the propeller as dense as the throttle."""
+    """Send control surfaces whenever one has moved by a step, and propeller opacity by throttle."""
     import rerun as rr
 
     for name, part in scene.parts.items():
@@ -315,23 +313,23 @@ def _send_moving(rec: "rr.RecordingStream", scene: Scene, log: Log, start: int, 
 
 
 def _changes(values: NDArray[Any], start: int) -> NDArray[np.intp]:
-    """Rows from `start` on whose value is not that of the row before; the very first among them."""
+    """Rows from `start` on whose value differs from the row before; the first row counts."""
     changed = np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
     return changed[changed >= start]
 
 
 def _every(log: Log, rate_hz: float) -> int:
-    """How many rows lie between samples at about `rate_hz`."""
+    """Rows between samples at about `rate_hz`."""
     return max(1, round(1.0 / (rate_hz * max(float(log.measured["dt_s"][-1]), 1e-3))))
 
 
 def _ns(t_s: Array) -> NDArray[np.timedelta64]:
-    """Seconds as whole nanoseconds, rounded, where Rerun would cut off."""
+    """Seconds as nanoseconds, rounded, not truncated as by Rerun."""
     return np.round(t_s * 1e9).astype("timedelta64[ns]")
 
 
 def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array) -> None:
-    """The way so far: truth, its shadow on the ground, the GPS fixes; and the mean wind at the launch point."""
+    """Send the path so far, its shadow on the ground, the GPS fixes and the mean wind."""
     import rerun as rr
 
     every = _every(log, _TRACK_HZ)
@@ -342,7 +340,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
     rec.log("world/truth/shadow", rr.LineStrips3D([shadow], colors=(0, 0, 0, 120), radii=thin), static=True)
     on_map = rr.GeoLineStrings(lat_lon=[here[::every]], colors=TRUTH, radii=rr.Radius.ui_points(2.0))
     rec.log("map/truth", on_map, static=True)
-    rec.log("world/truth/body/large", rr.Transform3D(scale=_LARGE * _extent(log)[1]), static=True)
+    rec.log("world/truth/body/large", rr.Transform3D(scale=_LARGE * extent(log)[1]), static=True)
     fixes = log.measured["gps_p_e_m"][log.measured["gps_new"] > 0]
     if len(fixes):
         rec.log("world/gps", rr.Points3D(fixes, colors=ESTIMATE, radii=rr.Radius.ui_points(1.5)), static=True)
@@ -361,7 +359,7 @@ def _send_tracks(rec: "rr.RecordingStream", scene: Scene, log: Log, here: Array)
 
 
 def _path_frame(log: Log) -> Array:
-    """Level frames along the smoothed path, shape (n, 3, 3); where there is no path, along the nose."""
+    """Level frames along the smoothed path, shape (n, 3, 3); along the nose if there is no path."""
     v_e_m_s, nose = log.truth["v_e_m_s"], log.truth["R_eb"][:, :, 0]
     ahead = v_e_m_s[:, 0] + 0.3 * nose[:, 0] + 1j * (v_e_m_s[:, 1] + 0.3 * nose[:, 1])
     half = max(1, round(_CHASE_S / max(float(log.measured["dt_s"][-1]), 1e-3)))
@@ -372,7 +370,7 @@ def _path_frame(log: Log) -> Array:
 
 
 def _send_end(rec: "rr.RecordingStream", flight: Flight) -> None:
-    """What is known when the flight has ended: its events and its story."""
+    """Send what is known after the flight: its events and its story."""
     import rerun as rr
 
     events: Sequence[Event] = flight.events
@@ -381,108 +379,3 @@ def _send_end(rec: "rr.RecordingStream", flight: Flight) -> None:
         columns = rr.TextLog.columns(text=[printable(e.text) for e in events], level=[e.level.upper() for e in events])
         rec.send_columns("events", when, columns)
     rec.log("story", rr.TextDocument(story(flight), media_type=rr.MediaType.MARKDOWN), static=True)
-
-
-def _blueprint(log: Log | None, release_s: float, ranges: Mapping[str, Range]) -> "rrb.Blueprint":
-    """The layout: chase view, overview, story, events and map on the left; plots and states on the right.
-
-    log, ranges : what the overview and the axes of the plots shall hold; None and empty for a flight to come
-    """
-    import rerun as rr
-    import rerun.blueprint as rrb
-
-    up = (0.0, 0.0, -1.0)
-    sky = rrb.Background(color=_SKY)
-    faint = rr.LineStrips3D.from_fields(colors=(*TRUTH, 70), radii=rr.Radius.ui_points(0.8))
-    chase = rrb.Spatial3DView(
-        origin="/world/chase",
-        contents=["+ /world/**", "- /world/truth/body/large/**", "- /world/launch", "- /world/gps", "- /world/wind"],
-        name="Chase: orange truth, blue estimate", background=sky, line_grid=False,
-        overrides={"world/truth/track": faint},
-        eye_controls=rrb.EyeControls3D(position=(-1.75, -0.3, -0.8), look_target=(0.0, 0.0, 0.0), eye_up=up),
-    )  # fmt: skip
-    centre, reach = _extent(log)
-    overview = rrb.Spatial3DView(
-        origin="/world", contents=["+ /world/**", "- /world/estimate/body/**"],
-        name="The whole flight", background=sky, line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            position=centre + reach * np.array([-0.7, -0.42, -0.58]), look_target=centre, eye_up=up
-        ),
-    )  # fmt: skip
-    degrees_wide = 1.6 * reach / 111_320.0
-    words = rrb.Tabs(
-        rrb.TextDocumentView(origin="/story", name="Story"),
-        rrb.TextLogView(origin="/events", name="Events"),
-        rrb.MapView(origin="/map", name="Map", zoom=float(np.log2(360.0 / degrees_wide) + 0.3)),
-        active_tab=0,
-    )
-    span = _span(log, release_s)
-    axis = rrb.TimeAxis(view_range=span) if span else None
-    # A page of a sensor that is not fitted is left out.
-    pages = {name: plots for name, plots in PAGES.items() if not ranges or any(p.path in ranges for p in plots)}
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(chase, rrb.Horizontal(overview, words, column_shares=[5, 4]), row_shares=[3, 2]),
-            rrb.Vertical(
-                rrb.Tabs(*(_page(name, plots, axis, ranges) for name, plots in pages.items()), active_tab=0),
-                rrb.StateTimelineView(origin="/states", name="Phase, mode, estimator", time_view=axis),
-                row_shares=[9, 2],
-            ),
-            column_shares=[9, 8],
-        ),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, playback_speed=1.0),
-        rrb.TopPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        rrb.BlueprintPanel(state="hidden"),
-        auto_layout=False,
-        auto_views=False,
-    )
-
-
-def _page(name: str, plots: Sequence[Plot], axis: "rrb.TimeAxis | None", ranges: Mapping[str, Range]) -> "rrb.Vertical":
-    """The plots of a page below one another; a legend where it differs from the one above."""
-    import rerun.blueprint as rrb
-
-    views, heights = [], []
-    above: tuple[Curve, ...] = ()
-    for plot in plots:
-        legend = rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=plot.curves != above)
-        above = plot.curves
-        shown = ranges.get(plot.path)
-        axis_y = rrb.ScalarAxis(range=shown) if shown else None
-        views.append(
-            rrb.TimeSeriesView(
-                origin=f"/plots/{plot.path}", name=plot.title, axis_x=axis, axis_y=axis_y, plot_legend=legend
-            )
-        )
-        heights.append(_height(shown))
-    return rrb.Vertical(*views, row_shares=heights, name=name)
-
-
-def _height(shown: Range | None) -> float:
-    """Height of a plot for its share of the page, in pixels: the viewer labels powers of ten 24 pixels apart."""
-    frame, least = 46.0, 70.0
-    if shown is None:
-        return frame + 2.0 * least
-    span = shown[1] - shown[0]
-    return frame + max(least, 24.0 * span / 10.0 ** np.floor(np.log10(span)))
-
-
-def _extent(log: Log | None) -> tuple[Array, float]:
-    """Centre of the flown volume, shape (3,), and its reach in metres."""
-    if log is None or len(log) == 0:
-        return np.array([0.0, 0.0, -30.0]), 150.0
-    corners = np.array([log.truth["p_e_m"].min(axis=0), log.truth["p_e_m"].max(axis=0), np.zeros(3)])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    return 0.5 * (low + high), max(60.0, float(np.linalg.norm(high - low)))
-
-
-def _span(log: Log | None, release_s: float) -> "rrb.TimeRange | None":
-    """The time that the plots show at first: all of it, and some before."""
-    import rerun.blueprint as rrb
-
-    if log is None or len(log) == 0:
-        return None
-    first_s, last_s = (float(t_s) - release_s for t_s in log.truth["t_s"][[0, -1]])
-    first_s -= 0.16 * (last_s - first_s)  # room for the legends
-    return rrb.TimeRange(*(rrb.TimeRangeBoundary.absolute(seconds=t_s) for t_s in (first_s, last_s)))

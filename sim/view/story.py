@@ -1,10 +1,11 @@
-"""The story of a flight in words: what was flown, how it ended, and its verdict."""
+"""The summary of a flight in Markdown: what was flown, how it ended, and its verdict."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from sim.log import Flight
 from sim.outside.wording import markdown
+from sim.rows import Row, markdown_table
 
 
 def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> Any:
@@ -14,7 +15,7 @@ def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> An
 
 
 def story(flight: Flight) -> str:
-    """What was flown and how it went, as Markdown."""
+    """What was flown and how it ended, as Markdown."""
     manifest = flight.manifest
     names = [setting(manifest, name) for name in ("scenario", "aircraft", "estimator", "autopilot")]
     seed = setting(manifest, "seed")
@@ -23,15 +24,10 @@ def story(flight: Flight) -> str:
     how = flight.outcome.replace("_", " ").capitalize() + f" at {end_s:.1f} s"
     message = f": {markdown(flight.message)}. " if flight.message else ". "
     lines = [f"## {markdown(what)}", "", how + message + _air(manifest), ""]
-    verdict = manifest.get("verdict") or ()
-    if verdict:
-        lines += ["| check | measured | limit | |", "|-|-:|-:|-|"]
-        for row in verdict:
-            measured, limit = (_figure(row[key], markdown(row["unit"])) for key in ("measured", "limit"))
-            passed = "passed" if row["passed"] else "**FAILED**"
-            lines.append(f"| {markdown(row['name'])} | {measured} | {row.get('sense', '<=')} {limit} | {passed} |")
+    if verdict := manifest.get("verdict"):
+        lines += markdown_table(map(Row.from_json, verdict))
     lines += ["", f"Heading is judged against the true {flight.heading_reference}.", ""]
-    orange = setting(manifest, "reference", "the truth")  # of a replayed log: whatever attitude it holds
+    orange = setting(manifest, "reference", "the truth")  # of a replayed log: the attitude recorded in it
     lines += [f"Orange is {markdown(orange)}, blue the estimate, green a sensor, grey a demand."]
     return "\n".join(lines)
 
@@ -46,7 +42,3 @@ def _air(manifest: Mapping[str, Any]) -> str:
     for one, things in (("gust", air.get("gusts") or ()), ("thermal", air.get("thermals") or ())):
         rest += [f"{len(things)} {one}" + ("s" if len(things) > 1 else "")] if things else []
     return ", ".join([wind + shear, *rest]) + "."
-
-
-def _figure(value: Any, unit: str) -> str:
-    return f"{value:.3g} {unit}".strip() if isinstance(value, int | float) else "not measured"

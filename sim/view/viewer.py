@@ -1,4 +1,4 @@
-"""Rerun's viewer as a process of its own, on the loopback address alone."""
+"""The Rerun viewer as a separate process, bound to the loopback address."""
 
 import os
 import socket
@@ -17,7 +17,7 @@ from sim.recording import RecordingError
 class Viewer:
     """A viewer process that was started.
 
-    process : of the viewer, which outlives us     url : its gRPC server, for `LiveView`
+    process : of the viewer, which outlives this one     url : its gRPC server, for `LiveView`
     address : to be opened in a browser; None where a window opens by itself
     """
 
@@ -27,18 +27,18 @@ class Viewer:
 
 
 def open_viewer(path: str | Path | None = None, *, web: bool = False) -> Viewer:
-    """Start Rerun's viewer on the recording at `path`, or empty for a live flight; on the loopback address only.
+    """Start the Rerun viewer on the recording at `path`, or empty for a live flight; on the loopback address only.
 
-    web : serve it to a browser instead of opening a window, as one must where there is no display
+    web : serve it to a browser instead of opening a window, needed without a display
 
     Raises
     ------
-    RecordingError    no file there, no display to open a window on, or a viewer that does not start
+    RecordingError    no such file, no display, or the viewer does not start
     """
     if path is not None and not Path(path).is_file():
         raise RecordingError(f"no Rerun recording at {path}: there is no such file")
     if not web and not _has_display():
-        raise RecordingError("no display here to open a window on: add --web to serve the recording to a browser")
+        raise RecordingError("no display to open a window on: add --web to serve the recording to a browser")
     grpc_port, web_port = free_port(), free_port()
     url = f"rerun+http://127.0.0.1:{grpc_port}/proxy"
     command = [str(executable()), "--bind", "127.0.0.1", "--port", str(grpc_port)]
@@ -49,7 +49,7 @@ def open_viewer(path: str | Path | None = None, *, web: bool = False) -> Viewer:
         env={**os.environ, "RERUN_ANALYTICS": "0"},
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         start_new_session=True,
-        preexec_fn=die_with_parent if web else None,  # a window may stay, a server may not
+        preexec_fn=die_with_parent if web else None,  # a window may stay open, a server must end
     )  # fmt: skip
     for port in (grpc_port, web_port) if web else (grpc_port,):
         await_port(process, port)
@@ -58,7 +58,7 @@ def open_viewer(path: str | Path | None = None, *, web: bool = False) -> Viewer:
 
 
 def executable() -> Path:
-    """Rerun's own program as it comes with the package; ``python -m rerun`` would leave it running when terminated."""
+    """The Rerun program of the package; ``python -m rerun`` would leave it running when terminated."""
     spec = find_spec("rerun_cli")
     folder = Path(spec.origin).parent if spec and spec.origin else Path()
     candidates = (folder / "Rerun.app" / "Contents" / "MacOS" / "Rerun", folder / "rerun.exe", folder / "rerun")
@@ -73,14 +73,14 @@ def _has_display() -> bool:
 
 
 def free_port() -> int:
-    """A port of the loopback address that nobody listens on at this moment."""
+    """A free port of the loopback address."""
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         return int(s.getsockname()[1])
 
 
 def await_port(process: subprocess.Popen[bytes], port: int, within_s: float = 20.0) -> None:
-    """Wait until `process` listens on `port` of the loopback address; RecordingError where it does not."""
+    """Wait until `process` listens on `port` of the loopback address; RecordingError if it does not."""
     end = time.monotonic() + within_s
     while time.monotonic() < end:
         if process.poll() is not None:

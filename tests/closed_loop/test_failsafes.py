@@ -88,7 +88,7 @@ def test_gps_lost_circles_then_glides_and_flies_on():
     # With 4 m/s of wind it drifts by 240 m in that minute; straight on it would have flown 750 m.
     v = flight.log.truth["v_e_m_s"][silent, :2] - flight.log.truth["wind_e_m_s"][silent, :2]
     assert np.hypot(*(v.sum(axis=0) * flight.dt_s)) < 250.0
-    assert {"mode circle: no GPS", "mode glide: no GPS for long"} <= {e.text for e in flight.events}
+    assert {"mode circle: no GPS", "mode glide: no GPS for a long time"} <= {e.text for e in flight.events}
     np.testing.assert_allclose(heights_m(flight)[-250:], 100.0, rtol=0, atol=12.0)
 
 

@@ -74,7 +74,7 @@ def test_flight_without_a_fault_fills_every_row():
     [
         (KeyError("mine"), "KeyError: 'mine'"),
         (None, "returned NoneType"),
-        (AttitudeEstimate(np.eye(3), health=9), "health is no Health"),
+        (AttitudeEstimate(np.eye(3), health=9), "health is not a Health"),
         (AttitudeEstimate(np.full((3, 3), np.nan)), "R_eb is not finite"),
     ],
 )

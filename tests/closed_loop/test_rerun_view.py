@@ -349,7 +349,7 @@ def test_open_viewer_without_a_display_says_what_to_do(folder, monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(RecordingError, match=r"no display here .* --web"):
+    with pytest.raises(RecordingError, match=r"no display to open .* --web"):
         viewer.open_viewer(folder / "flight.rrd")
 
 

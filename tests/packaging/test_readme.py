@@ -115,7 +115,7 @@ def test_readme_verdict_shows_the_checks_and_limits_of_the_scenario() -> None:
     rows = re.findall(r"^ (\S.*?) +[-\d.]+ +([<>]= -?[\d.]+)(?: +\S+)? +pass *$", shown[1], re.M)
     checks = find("hand_launch").checks
     limits = (check.limit if check.per_flight_limit is None else check.per_flight_limit for check in checks)
-    assert rows == [(check.name, f"{check.sense} {limit:.2f}") for check, limit in zip(checks, limits, strict=True)]
+    assert rows == [(check.name, f"{check.sense} {limit:.4g}") for check, limit in zip(checks, limits, strict=True)]
 
 
 @pytest.mark.usefixtures("here")

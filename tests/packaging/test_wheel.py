@@ -15,7 +15,7 @@ from scenarios.harness.registry import registered
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("estimator", "autopilot", "sim", "scenarios", "wingslevel")
-DATA = (".xml", ".toml", ".md", ".obj", ".glb")
+DATA = (".xml", ".toml", ".md", ".obj", ".glb", ".h", ".c")
 
 
 @pytest.fixture(scope="module")

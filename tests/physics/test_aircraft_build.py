@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from sim.aeroplane.jsbsim_model import AIRCRAFT
-from sim.aircraft.design import builder
+from sim.aircraft.design import aerodynamics, builder
 from sim.aircraft.design.lattice import Attached, flap_effectiveness
 from sim.aircraft.design.masses import Box, Spread, balance
 from sim.aircraft.design.shape import Shape
@@ -177,8 +177,8 @@ def test_folding_propeller_neither_brakes_nor_is_driven():
     """Folded blades have no drag: no term for stopped blades, and no thrust or power below 0 in the tables."""
     fixed = build.DESIGN
     folding = replace(fixed, drive=replace(fixed.drive, folding=True))
-    assert builder._stopped_propeller(fixed)
-    assert not builder._stopped_propeller(folding)
+    assert aerodynamics._stopped_propeller(fixed)
+    assert not aerodynamics._stopped_propeller(folding)
     least = {}
     for design in (fixed, folding):
         root = ET.fromstring(builder._propeller(design.drive, design.shape.propeller_diameter_m))

@@ -43,7 +43,7 @@ def test_record_estimate_of_lists_and_single_precision_is_accepted(flown):
     ("change", "fault"),
     [
         ({"R_eb": np.full((3, 3), np.nan)}, "not finite"),
-        ({"R_eb": 1.01 * np.eye(3)}, "no rotation"),
+        ({"R_eb": 1.01 * np.eye(3)}, "not a rotation"),
         ({"R_eb": np.diag([1.0, 1.0, -1.0])}, "reflection"),
         ({"R_eb": np.eye(4)}, "shape"),
         ({"R_eb": np.zeros(9)}, "shape"),
@@ -51,7 +51,7 @@ def test_record_estimate_of_lists_and_single_precision_is_accepted(flown):
         ({"R_eb": np.eye(3), "gyro_bias_b_rad_s": np.array([np.nan, 0.0, 0.0])}, "gyro_bias_b_rad_s"),
         ({"R_eb": np.eye(3), "omega_b_rad_s": np.zeros(2)}, "shape"),
         ({"R_eb": np.eye(3), "omega_b_rad_s": np.zeros((3, 1))}, "shape"),
-        ({"R_eb": np.eye(3), "health": 9}, "health is no Health: 0 STARTING, 1 GOOD, 2 POOR"),
+        ({"R_eb": np.eye(3), "health": 9}, "health is not a Health: 0 STARTING, 1 GOOD, 2 POOR"),
     ],
 )
 def test_record_estimate_of_an_unusable_answer_is_refused_by_name(flown, change, fault):
@@ -79,7 +79,7 @@ def test_record_command_outside_what_a_servo_can_do_is_refused(flown, command):
 
 
 def test_record_command_in_an_unknown_mode_is_refused_with_those_there_are(flown):
-    with pytest.raises(Unusable, match=r"mode 77 is no Mode: 0 MANUAL, .*5 LAUNCH"):
+    with pytest.raises(Unusable, match=r"mode 77 is not a Mode: 0 MANUAL, .*5 LAUNCH"):
         record_command(flown, 0, ActuatorCommand(0.0, 0.0, 0.0, 0.0, 77))
 
 

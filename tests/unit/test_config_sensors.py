@@ -111,8 +111,8 @@ def test_sensor_figure_of_any_kind_is_changed_by_text(name, text, value):
         ),
         ("gyro.bias_deg_s", "true", "gyro.bias_deg_s = True deg/s of sensor suite generic: must be a number"),
         ("gyro.bias_deg_s", "NaN", "write a plain finite number"),
-        ("magnetometer.noise_ut", "1", "sensor suite generic: no magnetometer fitted; choose sensors that have one"),
-        ("sensors.airspeed.noise_pa", "1", "sensor suite generic: no airspeed fitted; choose sensors that have one"),
+        ("magnetometer.noise_ut", "1", "sensor suite generic: no magnetometer fitted; choose a suite that has one"),
+        ("sensors.airspeed.noise_pa", "1", "sensor suite generic: no airspeed fitted; choose a suite that has one"),
         ("board.lever_arm", "1", "did you mean board.lever_arm_b_m"),
     ],
 )

@@ -54,8 +54,8 @@ def test_events_of_failsafes_are_warnings_that_say_why():
     told = [e for e in events_of(log, Outcome.COMPLETED, "", script, 0.0) if not e.text.startswith("estimator")]
     warnings = [e.text for e in told if e.level == "warn"]
     assert sorted(warnings[:4]) == sorted(
-        ["mode circle: no GPS", "mode glide: no GPS for long", "mode level: estimator unhealthy",
-         "mode low: too near the ground"]
+        ["mode circle: no GPS", "mode glide: no GPS for a long time", "mode level: estimator unhealthy",
+         "mode low: too close to the ground"]
     )  # fmt: skip
     assert sorted(warnings[4:]) == ["mode return: no radio", "radio lost"]
     assert [e.text for e in told if e.level == "info"] == ["mode course", "mode course", "radio back", "mode course"]

@@ -23,7 +23,7 @@ def test_packed_file_that_grows_without_end_is_refused_with_its_size(tmp_path, m
     """A hundred times its size is the most, or what any log may have."""
     monkeypatch.setattr(files, "FREELY", 1 << 20)
     (tmp_path / "log.csv.gz").write_bytes(gzip.compress(b"0,0,0\n" * 1_000_000))
-    with pytest.raises(LogError, match=r"log\.csv\.gz: .* kB packed, more than 1 MB unpacked"):
+    with pytest.raises(LogError, match=r"log\.csv\.gz: .* kB compressed, more than 1 MB decompressed"):
         logs.read(tmp_path / "log.csv.gz")
 
 

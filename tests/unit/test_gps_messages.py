@@ -310,7 +310,7 @@ def test_nmea_date_that_comes_late_holds_for_what_was_before() -> None:
 @pytest.mark.parametrize(
     ("start", "t_s", "message"),
     [
-        (datetime(2025, 6, 1, 12), 1.0, "say its time zone"),
+        (datetime(2025, 6, 1, 12), 1.0, "add a time zone"),
         (datetime(1979, 6, 1, tzinfo=UTC), 1.0, "6 January 1980"),
         (datetime(2068, 12, 31, 23, 59, 59, tzinfo=UTC), 1.0, "2068"),
         (START, 1e12, "2068"),
@@ -591,7 +591,7 @@ def test_file_without_a_fix_is_refused_with_what_it_holds(tmp_path) -> None:
         ValueError, match=r"log.nmea: no GPS fix in it \(found: checksum 1, no fix 1, other messages 1\)"
     ):
         gps_messages.read_nmea(path)
-    with pytest.raises(ValueError, match=r"log.nmea: no GPS fix in it: neither a sentence nor a message was found"):
+    with pytest.raises(ValueError, match=r"log.nmea: no GPS fix in it: no sentences or messages found"):
         gps_messages.read_ubx(path)
     with pytest.raises(ValueError, match=r"cannot read .*none.ubx: No such file"):
         gps_messages.read_ubx(tmp_path / "none.ubx")

@@ -164,7 +164,7 @@ def one_line(capfd) -> str:
         ("def script(config): return None", "script: it returned None, must return a Script"),
         ("def script(config): return Script([(0.0, 'up')])", "at 0 s it asks for 'up', must be a Setpoint"),
         ("def script(config): return Script([(0.0, Setpoint(77))])", "asks for mode 77, must be a Mode"),
-        ("def script(config): return Script([])", "Script: no set-point; give at least one"),
+        ("def script(config): return Script([])", "Script: no setpoint; give at least one"),
         ("metric = 3", "checks is (Check(name='survived'"),
         ("CONFIG = {}", "config is {}, must be a FlightConfig"),
         ("script = None", "script is None, must be a function"),

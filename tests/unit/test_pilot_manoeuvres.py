@@ -201,7 +201,7 @@ def test_inverted_circuit_is_a_square_flown_upside_down():
         (lambda: stall_turn(0.0, 1.0, AFTER, over_s=-2.0), "stall_turn: over_s = -2.0"),
         (lambda: spin(0.0, -1.0, AFTER), "spin: hold_s = -1.0"),
         (lambda: inverted_circuit(0.0, AFTER, 4, 0.0, AFTER), "inverted_circuit: leg_s = 0.0"),
-        (lambda: inverted_circuit(0.0, Setpoint(Mode.RETURN), 4, 9.0, AFTER), "RETURN must be one of mode COURSE"),
+        (lambda: inverted_circuit(0.0, Setpoint(Mode.RETURN), 4, 9.0, AFTER), "RETURN: must be of mode COURSE"),
         (lambda: spin(0.0, 5.0, AFTER, throttle=1.5), "Setpoint.throttle: 1.5"),
     ],
 )

@@ -137,7 +137,7 @@ def test_replay_of_an_estimator_that_fails_says_so_and_is_recorded(flights, tmp_
     """No scores, one line with class, time and fault, and a recording that says it too."""
     _, log = flights[AIR]
     replayed = replay(log, f"{__file__}:Broken")
-    assert replayed.failure.startswith("Broken at 3.00 s: R_eb is no rotation")
+    assert replayed.failure.startswith("Broken at 3.00 s: R_eb is not a rotation")
     assert np.isnan(list(replayed.scores.values())).all()
     flight = as_flight(log, replayed, Window())
     assert flight.outcome == Outcome.ESTIMATOR_FAILED

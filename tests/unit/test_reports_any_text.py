@@ -94,7 +94,7 @@ def test_terminal_of_any_text_prints_it_and_obeys_none(text: str, monkeypatch) -
         console.out().print(console.table("t", ("", "n"), [[text, "5678"]], wrapping=(0,)))
     shown = printed(stream)
     assert all(c == "\n" or c.isprintable() for c in shown)
-    assert "1234.50" in shown
+    assert "1234" in shown
     assert "5678" in shown
     assert "passed: 0 of 1 flights, 0 of 1 scenarios pooled" in shown
 
@@ -111,7 +111,7 @@ def test_tables_narrow_keep_names_and_numbers(columns: int, monkeypatch, capsys)
     console.out().print(console.table("crosswind", headings, [cells], text=(0, 1), wrapping=(0,)))
     shown = " ".join(capsys.readouterr().out.split())
     assert shown.count(name) == 2
-    for text in ("12345.68", "<= 6.00", "deg", "FAIL", "3 of 4", "1.23 4.5 6.7", "8.9 c", "0.55*", "9/10 5/7", "GAP"):
+    for text in ("12346", "<= 6", "deg", "FAIL", "4 samples", "1.23 4.5 6.7", "8.9 c", "0.55*", "9/10 5/7", "GAP"):
         assert text in shown
 
 

@@ -131,7 +131,7 @@ def test_markdown_shows_failed_flights_with_their_numbers():
     text = verdict_of(flown(3.0), flown(7.0, 1, Outcome.GROUND_CONTACT)).to_markdown()
     assert text.startswith("# Verdict: FAILED")
     assert "## level, premerlani, 2 flights" in text
-    assert "| tilt RMS | 7 deg | <= 6 deg | **FAIL** |" in text
+    assert "| tilt RMS | 7.00 deg | ≤ 6 deg | **FAIL** |" in text
     assert "### seed 1 flight 0: ground_contact" in text
     assert "### seed 0" not in text
 

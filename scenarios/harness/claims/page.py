@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from scenarios.harness.checks import Row
 from scenarios.harness.claims.claim import Finding, Verdict, deciding
 from scenarios.harness.claims.run import Found
-from scenarios.harness.cli import console
-from sim.outside.wording import markdown
+from sim.rows import markdown_cells
 
 MARKS = {Verdict.CONFIRMED: "✅", Verdict.WITH_CONDITION: "🟡", Verdict.REFUTED: "❌"}
 
@@ -92,7 +91,4 @@ def _row(row: Row) -> str:
 
 
 def _cells(row: Row) -> str:
-    """Name, measured value and limit, with units, as three cells."""
-    unit = f" {markdown(row.unit)}" if row.unit else ""
-    limit = f"{'≤' if row.sense == '<=' else '≥'} {console.figures(row.limit)}{unit}"
-    return f"{markdown(row.name)} | {console.figures(row.measured)}{unit} | {limit}"
+    return " | ".join(markdown_cells(row))

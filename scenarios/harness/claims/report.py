@@ -54,8 +54,7 @@ def write_all(findings: Findings, markdown: Path | None, folder: Path | None) ->
 
 def line_text(row: Row) -> str:
     """A line in words: what, how much, and the limit."""
-    unit = f" {row.unit}" if row.unit else ""
-    return f"{row.name}: {console.figures(row.measured)}{unit} ({row.sense} {console.figures(row.limit)})"
+    return f"{row.name}: {row.sentence}"
 
 
 def tell(findings: Findings, *, detailed: bool) -> None:
@@ -94,8 +93,8 @@ def _tell_one(found: Found) -> None:
     if finding is None:
         return
     out.print(Text(f"found  {finding.told}"))
-    out.print(console.verdict_table("", finding.stands, console.figures))
+    out.print(console.verdict_table("", finding.stands))
     if finding.under:
-        out.print(console.verdict_table(finding.condition, finding.under, console.figures))
+        out.print(console.verdict_table(finding.condition, finding.under))
     over = f", over {finding.seeds} seed{'s' * (finding.seeds != 1)}" if finding.seeds else ", nothing left to chance"
     out.print(Text(str(finding.verdict), f"bold {COLOURS[finding.verdict]}").append(over, "not bold default"))

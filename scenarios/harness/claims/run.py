@@ -11,7 +11,7 @@ from scenarios.harness.claims.claim import Claim, Finding
 from scenarios.harness.claims.registry import claims
 from scenarios.harness.cli import console
 from scenarios.harness.gate.workers import fly_each
-from scenarios.harness.verdict import FAILED, PASSED, SIMULATION_FAILED, plain
+from scenarios.harness.verdict import FAILED, PASSED, SIMULATION_FAILED
 from sim.log import Outcome
 
 
@@ -51,9 +51,9 @@ class Found:
             "verdict": str(finding.verdict),
             "told": finding.told,
             "seeds": finding.seeds,
-            "stands": [plain(row) for row in finding.stands],
+            "stands": [row.to_json() for row in finding.stands],
             "condition": finding.condition,
-            "under": [plain(row) for row in finding.under],
+            "under": [row.to_json() for row in finding.under],
         }
 
 

@@ -9,7 +9,7 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -208,21 +208,11 @@ def number(value: float) -> str:
     return f"{value:.2f}" if value == 0.0 or 0.005 <= abs(value) < 1e7 else f"{value:.1e}"
 
 
-def figures(value: float) -> str:
-    """`value` to three significant digits, for figures of very different size; powers of ten beyond 0.001..99999."""
-    if not math.isfinite(value):
-        return "none"
-    if value == 0.0:
-        return "0"
-    if not 1e-3 <= abs(value) < 1e5:
-        return f"{value:.1e}"
-    size = abs(float(f"{value:.2e}"))  # rounded first: 9.996 is 10.0
-    return f"{value:.{max(0, 2 - math.floor(math.log10(size)))}f}"
-
-
-def verdict_table(title: str, rows: Sequence["Row"], written: Callable[[float], str] = number) -> "Grid":
-    """The verdict on one flight, or on several pooled: check, measured, limit, unit, pass."""
+def verdict_table(title: str, rows: Sequence["Row"]) -> "Grid":
+    """The results of checks: name, measured value, limit, unit, pass or FAIL."""
     from rich.text import Text
+
+    from sim.rows import limit_figures
 
     grid = _grid(title)
     grid.column("check", wraps=True)
@@ -231,7 +221,7 @@ def verdict_table(title: str, rows: Sequence["Row"], written: Callable[[float], 
     for row in rows:
         word = Text("pass", "green") if row.passed else Text("FAIL", "bold red")
         name = printable(f"{row.name} ({row.note})" if row.note else row.name)
-        grid.row([name, written(row.measured), f"{row.sense} {written(row.limit)}", printable(row.unit), word])
+        grid.row([name, row.figure, f"{row.sense} {limit_figures(row.limit)}", printable(row.unit), word])
     return grid
 
 

@@ -54,10 +54,8 @@ class Grid(Table):
 
     def column(self, heading: str, *, right: bool = False, wraps: bool = False) -> None:
         """Add a column; only those that wrap shrink if the table is too wide."""
-        self.add_column(
-            Text(heading), justify="right" if right else "left", no_wrap=not wraps,
-            overflow="fold" if wraps else "ignore",
-        )  # fmt: skip
+        # Never "ignore": rich 15 aligns nothing in such a column.
+        self.add_column(Text(heading), justify="right" if right else "left", no_wrap=not wraps, overflow="fold")
 
     def row(self, cells: Sequence[str | Text]) -> None:
         """Add a row; what is text of others stays on one line."""

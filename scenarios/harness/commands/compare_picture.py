@@ -31,6 +31,7 @@ from scenarios.harness.picture_style import (
     TEAL,
     VIOLET,
 )
+from scenarios.harness.plugins import short_name
 from sim.outside.wording import plotted
 
 COLOURS = (
@@ -183,7 +184,7 @@ def _names(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> Non
     ax.spines["bottom"].set_visible(False)
     for i, e in enumerate(entrants):
         ax.plot([0.005, 0.04], [i, i], color=colours[e.name], lw=4, solid_capstyle="butt")
-        name = plotted(e.name.rpartition(":")[2], 40)
+        name = plotted(short_name(e.name), 40)
         ax.text(0.055, i, name, va="center", fontweight="bold", fontsize=9.0 if len(name) < 22 else 7.6)
         for j, (instrument, letter) in enumerate(LETTERS.items()):
             has = instrument in e.given

@@ -15,6 +15,7 @@ from scenarios.harness.config import FlightConfig
 from scenarios.harness.flight import prepare
 from scenarios.harness.gate import guard
 from scenarios.harness.gate.preparing import in_time
+from scenarios.harness.plugins import short_name
 from scenarios.harness.recorder import record
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
@@ -155,7 +156,7 @@ def print_report(flown: Flown) -> None:
 
 def _name(scenario: str, config: FlightConfig) -> str:
     """Name of the folder of a recording."""
-    return f"{file_name(scenario)}-{file_name(config.estimator.rpartition(':')[2])}-seed{config.seed}"
+    return f"{file_name(scenario)}-{file_name(short_name(config.estimator))}-seed{config.seed}"
 
 
 def run(

@@ -13,7 +13,7 @@ from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.gate import guard
 from scenarios.harness.logs.recorded import RecordedLog
-from scenarios.harness.plugins import shared_settings, without
+from scenarios.harness.plugins import shared_settings, short_name, without
 from scenarios.harness.recorder import record
 from scenarios.harness.replay import Replayed, Window, as_flight, gone, judged_rows, known_to, make, replay, why_none
 from sim import recording
@@ -98,7 +98,7 @@ def replay_log(
     ValueError      one line: log, reference, map, estimator, parameter or folder; nothing has been written
     """
     window, params = window or Window(), params or {}
-    if not names or len({name.rpartition(":")[2] for name in names}) < len(names):
+    if not names or len({short_name(name) for name in names}) < len(names):
         raise ValueError(f"--estimator {','.join(names)}: name one or more, each only once")
     settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
     of_each, withheld = shared_settings(names, settings), property_names(withheld)

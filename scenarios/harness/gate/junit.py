@@ -11,7 +11,7 @@ from typing import Literal
 from xml.etree import ElementTree
 
 from scenarios.harness.checks import Row
-from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict, limit_text, measured_text
+from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict
 from sim.outside.wording import printable
 
 
@@ -70,7 +70,7 @@ def _of_row(row: Row, which: str, time_s: float = 0.0, message: str = "") -> _Ca
     name = f"{printable(row.name)} {which}"
     if row.passed:
         return _Case(name, time_s)
-    text = "; ".join(part for part in (f"{measured_text(row)}, limit {limit_text(row)}", message) if part)
+    text = "; ".join(part for part in (row.sentence, message) if part)
     return _Case(name, time_s, "failure", "check", printable(text))
 
 

@@ -17,6 +17,7 @@ from types import ModuleType
 from typing import Any
 
 from scenarios.harness.flight import Prepared
+from scenarios.harness.own_files import library_named
 from scenarios.harness.plugins import module_of_offer
 from scenarios.harness.registry import module_of_offer as module_of_scenario
 from sim.recording import versions
@@ -72,6 +73,8 @@ def _of_scenario(named: str) -> str:
 
 def _of_code(word: str, spec: str, module: str) -> str:
     """The code of others behind `spec`, whose class is of `module`; empty where it is all of the project."""
+    if (library := library_named(spec)) is not None:
+        return library.sha256
     place = spec.rpartition(":")[0] or module_of_offer(word, spec)
     return _of_file(Path(place)) if place.endswith(".py") else _of_others(place, module)
 

@@ -1,9 +1,8 @@
-"""Coefficients of the attached flow from the shape: AeroSandbox, which is needed for rebuilding alone.
+"""Coefficients of the attached flow from the shape, by AeroSandbox, which is needed only to rebuild a model.
 
-Slopes, damping and the effect of the surfaces come from a vortex lattice of wing, tailplane and fin together, in
-which the tail flies in the wing's downwash; the drag of the sections, and where the wing's section stalls, from
-`AeroBuildup` with NeuralFoil's polars at the Reynolds number of the cruise.  The fuselage is added by slender-body
-theory.
+Slopes, damping and control effects come from a vortex lattice of wing, tailplane and fin, with the tail in the
+downwash of the wing; profile drag and section stall from `AeroBuildup` with NeuralFoil polars at the Reynolds number
+of the cruise.  The fuselage is added by slender-body theory.
 
 References
 ----------
@@ -24,17 +23,17 @@ import numpy as np
 from estimator.interface import Array
 from sim.aircraft.design.shape import Shape
 
-MUNK = 0.9  # k2 - k1 of a body nine times as long as wide (NACA TR-184)
+MUNK = 0.9  # k2 - k1 of a body of fineness ratio 9 (NACA TR-184)
 BODY_SIDE = 1.5  # K_i of DATCOM figure 5.2.1.1-7: wing high on the body
-SPANWISE, CHORDWISE = 7, 5  # panels in each section of a surface, and along the chord
-STEP_DEG = 1.0  # of the differences
-RATE = 0.02  # of the differences, as an angle at the wing tip or over half the chord
-NARROW_M = 0.01  # within which the aileron's deflection begins and ends
+SPANWISE, CHORDWISE = 7, 5  # panels per section of a surface, and along the chord
+STEP_DEG = 1.0  # of finite differences
+RATE = 0.02  # of finite differences: angle at the wing tip or over half the chord
+NARROW_M = 0.01  # width over which the aileron deflection starts and ends
 
 
 @dataclass(frozen=True)
 class Sections:
-    """Aerofoils, by their names in the UIUC database, and the angle of the tailplane with the body."""
+    """Aerofoils, by their names in the UIUC database, and incidences."""
 
     wing: str
     tail: str
@@ -44,7 +43,7 @@ class Sections:
 
 @dataclass(frozen=True)
 class Attached:
-    """Coefficients per radian (of angle, of p b / 2 V, q c / 2 V, r b / 2 V); names say which of what.
+    """Coefficients per radian (of angle, of p b / 2 V, q c / 2 V, r b / 2 V); named by effect and cause.
 
     Moments about the centre of gravity in body axes, on the wing's area, mean chord and span.
     """
@@ -55,7 +54,7 @@ class Attached:
     cm_alpha: float
     wing_cl_zero: float
     wing_cl_alpha: float
-    tail_alpha: float  # of the tailplane alone, in the downwash: part of cl_alpha
+    tail_alpha: float  # contribution of the tailplane, in the downwash, to cl_alpha
     tail_incidence: float  # lift per radian of incidence of the tailplane
     downwash: float
     induced: tuple[float, float, float]  # drag of lift: coefficients of CL^2, CL, 1
@@ -94,7 +93,7 @@ def _aerosandbox() -> Any:
         import aerosandbox
     except ImportError as missing:
         raise ImportError(
-            "rebuilding an aeroplane needs AeroSandbox: pip install --group dev, or pip install aerosandbox"
+            "rebuilding an aircraft model requires AeroSandbox: pip install --group dev, or pip install aerosandbox"
         ) from missing
     return aerosandbox
 
@@ -105,8 +104,8 @@ class Lattice:
     Parameters
     ----------
     shape, sections         the aeroplane
-    airspeed_m_s            of the cruise: the Reynolds number
-    alpha_rad               about which the slopes are taken
+    airspeed_m_s            of the cruise, for the Reynolds number
+    alpha_rad               angle of attack of the linearisation
     """
 
     def __init__(self, shape: Shape, sections: Sections, airspeed_m_s: float, alpha_rad: float) -> None:
@@ -115,7 +114,7 @@ class Lattice:
         self.airspeed_m_s, self.alpha_deg = airspeed_m_s, float(np.degrees(alpha_rad))
 
     def _wing(self, twist_deg: float) -> Any:
-        """Tip to tip; `twist_deg` is the incidence that right (+) and left (-) gain along the aileron."""
+        """Tip to tip; `twist_deg` is added to the incidence along the right (+) and left (-) aileron."""
         s, asb = self.shape, self.asb
         stations, (inner, outer) = set(s.panel_y_m), (np.inf, np.inf)
         if twist_deg:
@@ -180,7 +179,7 @@ class Lattice:
         self, alpha_deg: float | None = None, beta_deg: float = 0.0, rates: tuple[float, float, float] = (0, 0, 0),
         tail_deg: float | None = 0.0, fin_deg: float | None = 0.0, aileron_deg: float = 0.0, wing: bool = True,
     ) -> Array:  # fmt: skip
-        """CL, CD, CY, Cl, Cm, Cn of the lattice; rates p b / 2 V, q c / 2 V, r b / 2 V; None leaves a surface off."""
+        """CL, CD, CY, Cl, Cm, Cn of the lattice; rates p b / 2 V, q c / 2 V, r b / 2 V; None removes a surface."""
         wings = [self._wing(aileron_deg)] if wing else []
         if tail_deg is not None:
             wings.append(self._tail(tail_deg))
@@ -200,8 +199,8 @@ class Lattice:
     def _lateral(self, step: float, **disturbed: Any) -> tuple[Array, Array]:
         """Derivatives of the whole aeroplane and of the fin alone.
 
-        The fin stands beside the tailplane but not in the wing's wake: the vortex of the lattice's root would lie in
-        the plane of the fin, and the sidewash hang on how close it happens to pass.
+        The fin is computed with the tailplane but without the wing, whose root vortex would lie in the plane of the
+        fin, with a sidewash that depends on how close it happens to pass.
         """
 
         def change(**on: Any) -> Array:
@@ -235,7 +234,7 @@ class Lattice:
         body = 2.0 * MUNK * s.fuselage_volume_m3 / s.wing_area_m2
         elevator, rudder, flap = (flap_effectiveness(x) for x in (s.elevator_part, s.rudder_part, s.aileron_part))
         at = np.radians(self.alpha_deg)
-        # The lag of the downwash acts as q at the tail (Etkin & Reid, section 5.5): lumped in, no alpha-dot term.
+        # The lag of the downwash acts as q at the tail (Etkin & Reid, section 5.5): included in q, no alpha-dot term.
         lag = downwash * 2.0 * s.tail_arm_m / s.chord_m
         return Attached(
             cl_zero=base[0] - alpha[0] * at, cl_alpha=alpha[0],
@@ -261,7 +260,7 @@ class Lattice:
         return float(1.2 * np.sqrt(s.aspect) * s.wing_z_m / s.span_m * 2.0 * width / s.span_m)
 
     def profile_drag(self, alpha_deg: Array) -> Array:
-        """Drag coefficient of the sections and the fuselage, without that of lift."""
+        """Profile drag coefficient of surfaces and fuselage, without induced drag."""
         found = self.asb.AeroBuildup(
             airplane=self._airplane([self._wing(0.0), self._tail(0.0), self._fin(0.0)], [self._fuselage()]),
             op_point=self.asb.OperatingPoint(velocity=self.airspeed_m_s, alpha=alpha_deg),
@@ -270,7 +269,7 @@ class Lattice:
         return np.asarray(found["D_profile"], float) / (q * self.shape.wing_area_m2)
 
     def section_limits(self, airspeed_m_s: float) -> tuple[float, float]:
-        """Least and greatest lift coefficient of the wing's section at `airspeed_m_s` (NeuralFoil)."""
+        """Minimum and maximum lift coefficient of the wing section at `airspeed_m_s` (NeuralFoil)."""
         angles = np.arange(-15.0, 18.0, 0.25)
         polar = self.asb.Airfoil(self.sections.wing).get_aero_from_neuralfoil(
             alpha=angles, Re=airspeed_m_s * self.shape.chord_m / 1.46e-5, mach=0.0, model_size="xlarge"

@@ -1,7 +1,7 @@
-"""Mass, balance and inertia of an aeroplane from the list of what it is made of.
+"""Mass, balance and inertia of an aeroplane from the list of its parts.
 
-A part is a box of even density (a point where its size is 0) or is spread over the wing, in proportion to the
-chord to some power: 1 is a skin, 0 a spar, 2 ribs.
+A part is a box of uniform density (a point if its size is 0) or is spread over the wing in proportion to a power of
+the chord: 1 for a skin, 0 for a spar, 2 for ribs.
 """
 
 from collections.abc import Sequence
@@ -12,12 +12,12 @@ import numpy as np
 from estimator.interface import Array
 from sim.aircraft.design.shape import Shape
 
-BALANCE_M = 0.002  # how far from the origin the centre of gravity may be found: what a builder can feel
+BALANCE_M = 0.002  # tolerance of the centre of gravity: what a builder can feel
 
 
 @dataclass(frozen=True)
 class Box:
-    """`mass_kg` evenly in a box: centre and size along body x, y, z."""
+    """`mass_kg` uniformly in a box: centre and size along body x, y, z."""
 
     name: str
     mass_kg: float
@@ -39,9 +39,9 @@ Part = Box | Spread
 
 
 def points(part: Part, shape: Shape) -> tuple[Array, Array]:
-    """Masses (n,) [kg] and places (n, 3) [m] with the mass, the balance and the inertia of the part."""
+    """Masses (n,) [kg] and positions (n, 3) [m] with the mass, balance and inertia of the part."""
     if isinstance(part, Box):
-        # Two masses at +-size / sqrt(12) on each axis have the second moments of the even box.
+        # Two masses at +-size / sqrt(12) on each axis have the second moments of the uniform box.
         corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / np.sqrt(12.0)
         return np.full(8, part.mass_kg / 8.0), np.array(part.at_m) + corners * np.array(part.size_m)
     n = 400
@@ -62,7 +62,7 @@ class Balance:
 
 
 def balance(parts: Sequence[Part], shape: Shape) -> Balance:
-    """Add the parts up; ValueError where they do not balance at the origin."""
+    """Sum of the parts; ValueError if they do not balance at the origin."""
     each = [points(p, shape) for p in parts]
     m, r = np.concatenate([e[0] for e in each]), np.concatenate([e[1] for e in each])
     total = float(m.sum())

@@ -1,4 +1,4 @@
-"""JSBSim's XML: small pieces of text that `sim.aircraft.design.builder` puts together."""
+"""Elements of JSBSim XML, combined by `sim.aircraft.design.builder`."""
 
 from collections.abc import Sequence
 
@@ -14,14 +14,14 @@ def number(x: float) -> str:
 
 
 def location(body_m: Sequence[float], name: str = "", tag: str = "location") -> str:
-    """A place of the body axes in JSBSim's structural axes (x aft, y right, z up)."""
+    """A position in body axes as XML in JSBSim structural axes (x aft, y right, z up)."""
     x, y, z = -body_m[0] + 0.0, body_m[1], -body_m[2] + 0.0
     label = f' name="{name}"' if name else ""
     return f'<{tag}{label} unit="M"><x>{x:.4f}</x><y>{y:.4f}</y><z>{z:.4f}</z></{tag}>'
 
 
 def table(variable: str, at: Array, values: Array) -> str:
-    """A table over one property."""
+    """A table of one property."""
     body = "\n".join(f"          {x:8.1f} {y:10.5f}" for x, y in zip(at, np.round(values, 5) + 0.0, strict=True))
     return (
         f'        <table>\n          <independentVar lookup="row">{variable}</independentVar>\n'
@@ -30,7 +30,7 @@ def table(variable: str, at: Array, values: Array) -> str:
 
 
 def table_2d(row: str, rows: Array, column: str, columns: Array, values: Array) -> str:
-    """A table over two properties, values of shape (rows, columns)."""
+    """A table of two properties, values of shape (rows, columns)."""
     head = " " * 18 + " ".join(f"{c:9.3g}" for c in columns)
     body = "\n".join(
         f"          {x:8.1f}" + "".join(f" {v:9.4f}" for v in np.round(line, 4) + 0.0)
@@ -60,7 +60,7 @@ def function(name: str, expression: str, about: str = "") -> str:
 
 
 def product(name: str, *factors: str | float, about: str = "") -> str:
-    """A function that is a product."""
+    """A function that multiplies `factors`."""
     return function(name, apply("product", *factors), about)
 
 

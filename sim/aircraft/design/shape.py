@@ -1,4 +1,4 @@
-"""The shape of an aeroplane: the ``[geometry]`` table of its airframe.toml, checked, with what follows from it.
+"""The shape of an aeroplane: the checked ``[geometry]`` table of its airframe.toml, and derived quantities.
 
 Body axes, origin at the centre of gravity: x forward, y right, z down, metres.
 """
@@ -13,20 +13,20 @@ import numpy as np
 
 from estimator.interface import Array
 
-SLENDER_FULLNESS = 0.55  # volume of a model's fuselage over that of the box around it: pod, boom and rounded corners
+SLENDER_FULLNESS = 0.55  # fuselage volume over its bounding box, of a model with pod and boom
 
 
 @dataclass(frozen=True)
 class Shape:
-    """The outline; the wing is made of flat panels, straight at the quarter chord.
+    """The outline; the wing consists of flat panels with a straight quarter chord.
 
-    panel_y_m : (n + 1,) where the right wing's panels begin and end, along the span as seen from above
-    panel_chord_m : (n + 1,) chords there        panel_dihedral_deg : (n,) angle of each panel with the horizontal
+    panel_y_m : (n + 1,) ends of the right wing's panels along the span, top view
+    panel_chord_m : (n + 1,) chords there        panel_dihedral_deg : (n,) dihedral of each panel
     wing_x_m, wing_z_m : quarter chord of the root        tail_arm_m : back to the quarter chord of tail and fin
-    fuselage_z_m : middle of its height at the wing       tail_z_m : of the tailplane and the foot of the fin
-    aileron_y_m : (2,) where the right one begins and ends, or empty
-    elevator_part, rudder_part, aileron_part : of the chord that moves; 0 is none
-    elevator_throw_deg, rudder_throw_deg, aileron_throw_deg : from the middle to the stop
+    fuselage_z_m : mid-height at the wing       tail_z_m : of the tailplane and the root of the fin
+    aileron_y_m : (2,) ends of the right aileron, or empty
+    elevator_part, rudder_part, aileron_part : fraction of the chord that moves; 0: none
+    elevator_throw_deg, rudder_throw_deg, aileron_throw_deg : full deflection to one side
     """
 
     span_m: float
@@ -57,7 +57,7 @@ class Shape:
 
     @classmethod
     def of(cls, airframe: Path) -> "Shape":
-        """From an airframe.toml; ValueError where a key is missing or the panels do not fit together."""
+        """From an airframe.toml; ValueError if a key is missing or the panels are inconsistent."""
         table: dict[str, Any] = tomllib.loads(airframe.read_text(encoding="utf-8"))["geometry"]
         missing = [f.name for f in fields(cls) if f.name not in table and f.default is MISSING]
         if missing:
@@ -76,13 +76,13 @@ class Shape:
 
     @cached_property
     def wing_area_m2(self) -> float:
-        """Area as seen from above."""
+        """Area, top view."""
         c = np.array(self.panel_chord_m)
         return float(np.sum(np.diff(self.panel_y_m) * (c[1:] + c[:-1])))
 
     @property
     def chord_m(self) -> float:
-        """Mean chord, the length of reference of the pitching moment."""
+        """Mean chord, reference length of the pitching moment."""
         return self.wing_area_m2 / self.span_m
 
     @property
@@ -99,7 +99,7 @@ class Shape:
 
     @cached_property
     def panel_rise_m(self) -> Array:
-        """Height of the panels' ends above the root, shape (n + 1,)."""
+        """Height of the panel ends above the root, shape (n + 1,)."""
         rise = np.diff(self.panel_y_m) * np.tan(np.radians(self.panel_dihedral_deg))
         return np.concatenate(([0.0], np.cumsum(rise)))
 
@@ -114,7 +114,7 @@ class Shape:
         return SLENDER_FULLNESS * self.fuselage_length_m * self.fuselage_height_m * self.fuselage_width_m
 
     def touching_points(self) -> dict[str, tuple[float, float, float]]:
-        """What can touch the ground, body axes."""
+        """Ground contact points, body axes."""
         half = 0.5 * self.span_m
         tip = self.wing_z_m - float(self.panel_rise_m[-1])
         belly = self.fuselage_z_m + 0.5 * self.fuselage_height_m + 0.01

@@ -1,8 +1,8 @@
-"""The wing at any angle: from the attached flow over the stall to a flat plate, and what a rolling wing then does.
+"""The wing at any angle of attack, attached, stalled or as a flat plate, and its behaviour in roll.
 
-Past the stall a strip that sinks loses lift: the damping of the roll fades, reverses (autorotation) and comes back
-once the whole wing is stalled.  It is worked out strip by strip for each angle of attack and helix angle
-``p b / 2 V``, so that a wing drops by itself and the spin that follows finds its own rate.
+Past the stall a descending strip loses lift: roll damping fades, reverses (autorotation) and returns once the whole
+wing is stalled.  It is computed strip by strip for each angle of attack and helix angle ``p b / 2 V``, so that wing
+drop and spin rate result from the model.
 
 References
 ----------
@@ -23,10 +23,10 @@ from estimator.interface import Array
 from sim.aircraft.design.lattice import Attached
 from sim.aircraft.design.shape import Shape
 
-WING_LIMIT = 0.9  # greatest lift of the wing over that of its section
+WING_LIMIT = 0.9  # maximum lift of the wing over that of its section
 STALL_SHARPNESS = 55.0  # 1 / rad: attached to stalled within about 5 degrees
 PLATE_CD90 = 1.98  # normal force of a flat plate across the flow, in two dimensions (Hoerner 1965)
-PLATE_SKIN = 0.02  # chordwise force of a stalled section: skin friction alone, the suction of the nose is lost
+PLATE_SKIN = 0.02  # chordwise force of a stalled section: skin friction, no leading-edge suction
 SMALL = 0.01  # helix angle of a derivative
 
 
@@ -38,11 +38,11 @@ def plate_normal(alpha_rad: ArrayLike, aspect: float) -> Array:
 
 @dataclass(frozen=True)
 class Polars:
-    """Coefficients of the whole aeroplane over all angles of attack.
+    """Coefficients of the whole aeroplane at all angles of attack.
 
-    profile_deg, profile_cd : (n,) drag without that of lift, attached
-    cd_extra, cd_lift : drag that no outline shows; the second goes with CL^2
-    section_limits : least and greatest lift coefficient of the wing's section
+    profile_deg, profile_cd : (n,) profile drag of the attached flow
+    cd_extra, cd_lift : drag not in the outline; the second times CL^2
+    section_limits : minimum and maximum lift coefficient of the wing section
     """
 
     shape: Shape
@@ -55,10 +55,10 @@ class Polars:
 
     @cached_property
     def stall_rad(self) -> tuple[float, float]:
-        """Where half the wing has stalled, below and above: so that its greatest lift is 0.9 of the section's."""
+        """Angles with half the wing stalled, negative and positive, for a maximum lift 0.9 of the section's."""
 
         def excess(at: float, side: float, limit: float) -> float:
-            a = np.linspace(0.0, at, 400) * side  # beyond, the plate takes over
+            a = np.linspace(0.0, at, 400) * side  # beyond it the plate dominates
             s = 1.0 / (1.0 + np.exp(np.clip(STALL_SHARPNESS * (at - side * a), -60.0, 60.0)))
             return float((side * self._wing_lift(a, s)).max()) - WING_LIMIT * abs(limit)
 
@@ -67,7 +67,7 @@ class Polars:
         return -float(below), float(brentq(excess, np.radians(4.0), np.radians(24.0), args=(1.0, high)))
 
     def stalled(self, alpha_rad: ArrayLike) -> Array:
-        """How far the wing has stalled, 0..1 (Beard & McLain, Eqn 4.10, with two angles of stall)."""
+        """Stalled fraction of the wing, 0..1 (Beard & McLain, Eqn 4.10, with two stall angles)."""
         a, (low, high) = np.asarray(alpha_rad, float), self.stall_rad
         above = 1.0 / (1.0 + np.exp(np.clip(-STALL_SHARPNESS * (a - high), -60.0, 60.0)))
         below = 1.0 / (1.0 + np.exp(np.clip(STALL_SHARPNESS * (a - low), -60.0, 60.0)))
@@ -81,7 +81,7 @@ class Polars:
         return np.interp(np.degrees(a), self.profile_deg, self.profile_cd) + self.cd_extra
 
     def lift_drag_pitch(self, alpha_rad: ArrayLike) -> tuple[Array, Array, Array]:
-        """CL, CD, Cm of the whole aeroplane with surfaces in line, at any angle of attack."""
+        """CL, CD, Cm of the whole aeroplane with neutral controls, at any angle of attack."""
         a, c, o = np.asarray(alpha_rad, float), self.attached, self.shape
         s = self.stalled(a)
         cl = c.cl_zero + c.cl_alpha * a
@@ -90,7 +90,7 @@ class Polars:
         wing = plate_normal(a, o.aspect)
         tail = plate_normal(a, o.tail_span_m / o.tail_chord_m)
         normal = wing + o.tail_area_m2 / o.wing_area_m2 * tail
-        # A stalled wing's force acts near half its chord, the tail's at its arm; both pitch the nose down.
+        # The force of a stalled wing acts near half chord, that of the tail at its arm; both pitch nose down.
         cm_plate = -wing * (0.25 - o.wing_x_m / o.chord_m) - o.tail_volume * tail
         floor = float(self._profile(np.zeros(1))[0])
         return (
@@ -120,29 +120,29 @@ class Polars:
 
     @cached_property
     def _strip_scale(self) -> float:
-        """Roll damping of the lattice over that of strips, each alone: the wing's own downwash."""
+        """Roll damping of the lattice over that of independent strips: the effect of the wing's own downwash."""
         return self.attached.roll_p / float(self._strips(0.0, SMALL, 0.0)[0] / SMALL)
 
     def rolling(self, alpha_rad: Array, helix: Array) -> tuple[Array, Array]:
         """Rolling and yawing moment per ``p b / 2 V``, each shape (alpha, helix); even in the helix angle.
 
-        Attached they are those of the lattice; the tail's part of them stays as it is.
+        Attached, they are those of the lattice; the contribution of the tail is constant.
         """
         k = self._strip_scale
         found = np.array([[self._strips(a, h, 0.0) / h for h in np.maximum(helix, SMALL)] for a in alpha_rad])
         fixed = self.attached.yaw_p - k * self._strips(0.0, SMALL, 0.0)[1] / SMALL
-        # The fin stands in reversed air when flying backwards.
+        # The flow at the fin reverses when flying backwards.
         return k * found[:, :, 0], k * found[:, :, 1] + fixed * np.cos(alpha_rad)[:, None]
 
     def roll_of_yawing(self, alpha_rad: Array) -> Array:
-        """Rolling moment per ``r b / 2 V``: the wing that comes forward lifts more, as long as it lifts."""
+        """Rolling moment per ``r b / 2 V``: the advancing wing lifts more, unless stalled."""
         k = self._strip_scale
         found = np.array([(self._strips(a, 0.0, SMALL) - self._strips(a, 0.0, -SMALL))[0] for a in alpha_rad])
         still = float((self._strips(0.0, 0.0, SMALL) - self._strips(0.0, 0.0, -SMALL))[0])
         return self.attached.roll_r + k * (found - still) / (2.0 * SMALL)
 
     def dihedral_shape(self, alpha_rad: ArrayLike) -> Array:
-        """Dihedral effect over its attached value: a strip's slope, never below 0.
+        """Dihedral effect over its attached value: the lift slope of a strip, at least 0.
 
         With w = V sin(alpha) at constant u, the force of a strip grows with w as
         ``2 sin(alpha) CN + cos(alpha) dCN/dalpha``.
@@ -153,6 +153,6 @@ class Polars:
         return np.clip(slope / self.attached.wing_cl_alpha, 0.0, 1.0)
 
     def aileron_shape(self, alpha_rad: ArrayLike, left_stalled: float) -> Array:
-        """Aileron effect over its attached value: weak on a stalled wing, reversed flying backwards."""
+        """Aileron effect over its attached value: weak on a stalled wing, reversed when flying backwards."""
         a = np.asarray(alpha_rad, float)
         return np.cos(a) * (1.0 - (1.0 - left_stalled) * self.stalled(a))

@@ -1,14 +1,14 @@
-"""Masses and figures of the aeroplane, from which its JSBSim model is made.
+"""Masses and figures of the aeroplane, the source of its JSBSim model.
 
     python -m sim.aircraft.endurance.build
 
-The outline is in airframe.toml; PROVENANCE.md tells where each figure comes from.
+The outline is in airframe.toml; PROVENANCE.md gives the source of each figure.
 """
 
 from pathlib import Path
 
 from sim.aircraft.design import builder
-from sim.aircraft.design.builder import Design, Drive
+from sim.aircraft.design.design import Design, Drive
 from sim.aircraft.design.lattice import Sections
 from sim.aircraft.design.masses import Box, Spread
 
@@ -40,7 +40,7 @@ DESIGN = Design(
         ohm=0.14,
         no_load_a=0.8,
         rotor_kg_m2=1.0e-4,
-        # Above J = 0.8 the air drives the propeller.
+        # Above J = 0.8 the propeller windmills.
         propeller=(
             (0.0, 0.110, 0.0520), (0.1, 0.107, 0.0530), (0.2, 0.102, 0.0540), (0.3, 0.094, 0.0530),
             (0.4, 0.082, 0.0505), (0.5, 0.066, 0.0455), (0.6, 0.047, 0.0375), (0.7, 0.025, 0.0255),
@@ -57,7 +57,7 @@ DESIGN = Design(
 
 
 def render() -> dict[str, str]:
-    """The model's files, {name: text}."""
+    """The files of the model, {name: text}."""
     return builder.render(DESIGN)
 
 

@@ -1,14 +1,14 @@
-"""Masses and figures of the sailplane, from which its JSBSim model is made.
+"""Masses and figures of the sailplane, the source of its JSBSim model.
 
     python -m sim.aircraft.gentle_lady.build
 
-The outline is in airframe.toml; PROVENANCE.md tells where each figure comes from.
+The outline is in airframe.toml; PROVENANCE.md gives the source of each figure.
 """
 
 from pathlib import Path
 
 from sim.aircraft.design import builder
-from sim.aircraft.design.builder import Design
+from sim.aircraft.design.design import Design
 from sim.aircraft.design.lattice import Sections
 from sim.aircraft.design.masses import Box, Spread
 
@@ -36,7 +36,7 @@ DESIGN = Design(
 
 
 def render() -> dict[str, str]:
-    """The model's files, {name: text}."""
+    """The files of the model, {name: text}."""
     return builder.render(DESIGN)
 
 
