@@ -37,6 +37,7 @@ NOT_RUN = {
     r"(cc|c\+\+|rustc) .*": "needs a compiler; tests/packaging/test_c_page.py runs it where there is one",
     r"wingslevel fly crosswind --estimator \./mine(_cpp|_rust)?\.so.*": "the same",
     r"pytest test_my_filter.py": "needs the plugin",
+    r"wingslevel list scenarios --markdown .*": "writes into docs/; tests/unit/test_scenario_page.py runs it",
     r"wingslevel claims( --markdown docs/claims.md)?": "takes minutes; tests/unit/test_claims.py compares the page",
 }
 # Commands that fly many scenarios or seeds: what is run instead, with the same options.
@@ -45,7 +46,7 @@ SHORTER = {
     r"(wingslevel check) (--json verdict.json)": r"\1 hand_launch --seeds 0 --workers 1 \2",
     r"(wingslevel check) (--estimator my_filter.py:\w+) (--junit .*)": r"\1 hand_launch --seeds 0 --workers 1 \2 \3",
 }
-COMING = ("api.md", "pytest.md", "scenarios.md")
+COMING = ("api.md", "pytest.md")
 # What a page takes for granted: commands that are run before it.
 BEFORE = {
     "docs/replay.md": ["wingslevel fly hand_launch --no-rerun", "wingslevel export --csv flight.csv"],
