@@ -11,7 +11,7 @@ from typing import Any
 
 from scenarios.harness import plugins
 from scenarios.harness.own_files import library_named
-from scenarios.harness.plugins import Maker, maker_name, parameters_of, short_name
+from scenarios.harness.plugins import Maker, parameters_of, short_name
 from sim.outside.wording import brief
 from sim.params import near_misses
 
@@ -23,7 +23,7 @@ def names_of(spec: str | Maker) -> tuple[str, ...]:
     """What an estimator may be called in front of a parameter; the name to suggest comes first."""
     if isinstance(spec, str) and (":" not in spec or library_named(spec)):
         return (short_name(spec),)
-    name = maker_name(spec).partition("(")[0].rpartition(":")[2].rpartition(".")[2]
+    name = short_name(spec).partition("(")[0].rpartition(".")[2]
     return tuple(dict.fromkeys((_WORDS.sub("_", name).lower(), name)))
 
 

@@ -30,7 +30,7 @@ ParamsOption = Annotated[bool, typer.Option("--params", help="The parameters of 
 EstimatorOption = Annotated[
     str | None,
     typer.Option(
-        "--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.",
+        "--estimator", metavar="NAME", help="Registered name, module:Class, file.py:Class or library.so.",
         autocompletion=complete.estimators,
     ),
 ]  # fmt: skip
@@ -129,6 +129,14 @@ LedgerOption = Annotated[
     typer.Option("--ledger", metavar="FOLDER", help="Keep each verdict there as it comes, and fly what is missing."),
 ]
 FLIGHT_TIMEOUT_S = 600.0
+PageOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Of scenarios: write the catalogue, with stories, limits, values and margins."),
+]
+VerdictOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="With --markdown: take the measured values from what check --json wrote."),
+]
 MarkdownOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")]
 CalibrationOption = Annotated[
     float | None,
@@ -162,7 +170,7 @@ ParameterOption = Annotated[
 LogEstimatorsOption = Annotated[
     str,
     typer.Option(
-        "--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.",
+        "--estimator", metavar="NAME,...", help="Registered names, module:Class, file.py:Class or library.so.",
         autocompletion=complete.estimators,
     ),
 ]  # fmt: skip
