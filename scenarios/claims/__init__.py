@@ -1,1 +1,1 @@
-"""The claims of the papers, each put to the test: one module for each subject, which exports ``CLAIMS``."""
+"""Testable claims of the papers, a module for each subject: see `scenarios.harness.claims.claim`."""

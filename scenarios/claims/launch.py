@@ -1,32 +1,44 @@
-"""The hand launch: what its acceleration does to an accelerometer and to the matrix, and how soon yaw is locked."""
+"""The hand launch: what its acceleration does to an accelerometer and to the matrix, and how soon yaw locks."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimator.interface import G_M_S2, Array
 from estimator.rotation import inclination_error_rad
-from scenarios.claims._flown import PUBLISHED, pooled_rms, slowest, tuned
-from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claims.flights import flights
-from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, axes, label
-from scenarios.harness.metrics import heading_error_deg, height_m, inclination_error_deg, settled_after_s, time_s
-from sim.log import Flight, Outcome
+from scenarios.harness.claims.claim import Finding, Paper, claim, line
+from scenarios.harness.claims.flights import flights, hit_ground, percentage, pooled_rms, slowest, tuned
+from scenarios.harness.claims.motions import NEVER
+from scenarios.harness.claims.picture import BLUE, ORANGE, RED, Panel
+from scenarios.harness.metrics import (
+    Series,
+    heading_error_deg,
+    height_m,
+    inclination_error_deg,
+    settled_after_s,
+    time_s,
+)
+from sim.log import Flight
 
-DIVE_S = 3.0  # whoever dives has done so by then
+DIVE_S = 3.0  # a dive has begun by then
 LOCKED_DEG = 15.0
 LOCK_SOON_S = 5.0  # "shortly after take-off": the aeroplane is not higher than a house
 WEIGHTS = (0.1, 0.3, 0.6, 1.2, 2.4)
 LARGE = 1.2
 WINDOWS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 40.0)
-RECOVERY_S = 10.0  # the paper's own time constant of patience, section "Feedback controller"
+RECOVERY_S = 10.0  # the paper's own time to recover, section "Feedback controller"
+UNGATED = tuned(launch_gate=NEVER)  # the paper's own roll-pitch correction, which does not ignore the launch
 
 
 def _pitch_deg(R_eb: Array) -> Array:
     return np.degrees(-np.arcsin(np.clip(R_eb[:, 2, 0], -1.0, 1.0)))
+
+
+def _true_pitch_deg(flight: Flight) -> Series:
+    pitch_deg = _pitch_deg(flight.log.truth["R_eb"])
+    return Series(time_s(flight), pitch_deg, np.ones(len(pitch_deg), bool))
 
 
 def _between(flight: Flight, from_s: float, to_s: float) -> NDArray[np.bool_]:
@@ -34,68 +46,59 @@ def _between(flight: Flight, from_s: float, to_s: float) -> NDArray[np.bool_]:
     return (t_s > from_s) & (t_s <= to_s)
 
 
-def _crashed(flown: Sequence[Flight]) -> float:
-    """Percentage of the flights that ended on the ground."""
-    return 100.0 * float(np.mean([flight.outcome == Outcome.GROUND_CONTACT for flight in flown]))
-
-
 def _lowest_pitch_deg(flight: Flight) -> float:
     return float(_pitch_deg(flight.log.truth["R_eb"])[_between(flight, 0.0, DIVE_S)].min())
 
 
-def _fooled_deg(flight: Flight) -> float:
-    """Pitch believed too much, at most, while the hand pushes."""
+def _false_pitch_deg(flight: Flight) -> float:
+    """Largest estimated minus true pitch during the throw."""
     log = flight.log
     too_much = _pitch_deg(log.flown["R_eb"]) - _pitch_deg(log.truth["R_eb"])
     return float(too_much[_between(flight, -0.3, 0.0)].max())
 
 
-def _dives(seeds: Sequence[int]) -> Finding:
+@claim(Paper.THEORY, "Accelerometers", seeds=10)
+def accelerometer_dives(seeds: Sequence[int]) -> Finding:
+    """At a hand launch an accelerometer alone causes a dive; the matrix does not.
+
+    Pitch control with an accelerometer alone takes the acceleration of a hand launch for a climb and dives; the matrix,
+    which relies on the gyros, does not.
+    """
     alone = flights("hand_launch", seeds, {}, "accelerometer_only")
-    # The paper's own roll-pitch correction: the push is not gated away.
-    matrix = flights("hand_launch", seeds, tuned(launch_gate=PUBLISHED["launch_gate"]))
-    fooled = float(np.median([_fooled_deg(flight) for flight in alone]))
-    down = float(np.median([time_s(flight)[-1] for flight in alone]))
+    matrix = flights("hand_launch", seeds, UNGATED)
+    false = float(np.median([_false_pitch_deg(flight) for flight in alone]))
+    down_s = float(np.median([time_s(flight)[-1] for flight in alone]))
     shallowest = max(_lowest_pitch_deg(flight) for flight in alone)
     nose = min(_lowest_pitch_deg(flight) for flight in matrix)
 
-    def draw(figure: Figure) -> None:
-        pitch, height = axes(figure, "Pitch after the release", "Height")
-        for flown, colour, name in ((alone, RED, "accelerometer alone"), (matrix, BLUE, "the matrix")):
-            for i, flight in enumerate(flown):
-                shown = _between(flight, -0.3, 4.0)
-                t_s = time_s(flight)[shown]
-                style = {"color": colour, "lw": 1, "label": name if i == 0 else None}
-                pitch.plot(t_s, _pitch_deg(flight.log.truth["R_eb"])[shown], **style)
-                height.plot(t_s, height_m(flight).value[shown], **style)
-        pitch.axhline(0.0, color=FAINT, lw=1)
-        pitch.legend(loc="lower right")
-        label(pitch, "s after the release", "true pitch, deg")
-        label(height, "s after the release", "m above the ground")
-
+    pitch = Panel("Pitch after the release", "true pitch, deg", "s after the release", legend="lower right")
+    height = Panel("Height", "m above the ground", "s after the release")
+    for flown, colour, name in ((alone, RED, "accelerometer alone"), (matrix, BLUE, "matrix")):
+        pitch.flights(flown, _true_pitch_deg, colour, name, -0.3, 4.0)
+        height.flights(flown, height_m, colour, "", -0.3, 4.0)
+    pitch.level(0.0)
     return Finding(
-        stands=(
-            line("accelerometer alone: flights that hit the ground", "%", _crashed(alone), ">=", 90.0),
-            line("accelerometer alone: shallowest of the dives", "deg", shallowest, "<=", -20.0),
-            line("the matrix: flights that hit the ground", "%", _crashed(matrix), "<=", 0.0),
-            line("the matrix: lowest the nose came", "deg", nose, ">=", 0.0),
-        ),
-        told=f"The push makes the accelerometer believe {fooled:.0f} degrees too much of pitch; every flight that "
-        f"steers by it dives, and hits the ground {down:.1f} s after the release. By the matrix, with no gate against "
-        f"the push, none comes down and the nose never drops below {nose:.0f} degrees.",
-        seeds=len(seeds),
-        draw=draw,
+        lines=[
+            line("accelerometer alone: flights that hit the ground", "%", percentage(alone, hit_ground), ">=", 90.0),
+            line("accelerometer alone: pitch of the shallowest dive", "deg", shallowest, "<=", -20.0),
+            line("matrix: flights that hit the ground", "%", percentage(matrix, hit_ground), "<=", 0.0),
+            line("matrix: lowest pitch", "deg", nose, ">=", 0.0),
+        ],
+        summary=f"During the throw the accelerometer shows {false:.0f} degrees too much pitch. Every flight controlled "
+        f"by it dives and hits the ground {down_s:.1f} s after the release. With the matrix, without any gate for the "
+        f"launch, no flight comes down, and the pitch never falls below {nose:.0f} degrees.",
+        panels=[pitch, height],
     )
 
 
 def forward_acceleration_m_s2(flight: Flight) -> Array:
-    """True acceleration along the nose: what the accelerometer's x axis feels beside gravity, shape (n,)."""
+    """True acceleration along the nose: the accelerometer's x axis without gravity, shape (n,)."""
     truth = flight.log.truth
     return np.asarray(truth["imu_force_b_m_s2"][:, 0] + G_M_S2 * truth["R_eb"][:, 2, 0])
 
 
 def _mean_over_deg(flown: Sequence[Flight], window_s: float) -> float:
-    """RMS of the forward acceleration averaged over `window_s`, as the tilt that it feigns, degrees."""
+    """RMS of the forward acceleration averaged over `window_s`, as an apparent inclination, degrees."""
     means = []
     for flight in flown:
         acceleration = forward_acceleration_m_s2(flight)[time_s(flight) > 5.0]
@@ -105,50 +108,53 @@ def _mean_over_deg(flown: Sequence[Flight], window_s: float) -> float:
     return float(np.degrees(np.sqrt(np.mean(np.square(np.concatenate(means)))) / G_M_S2))
 
 
-def _felt_tilt_deg(flight: Flight) -> Array:
-    """Angle between what the accelerometer feels and true down, degrees, shape (n,)."""
+def _apparent_tilt_deg(flight: Flight) -> Array:
+    """Angle between the specific force and true down, degrees, shape (n,)."""
     force_b = flight.log.truth["imu_force_b_m_s2"]
     felt = flight.log.truth["R_eb"].copy()
     felt[:, 2] = -force_b / np.linalg.norm(force_b, axis=1)[:, None]
     return np.degrees(inclination_error_rad(felt, flight.log.truth["R_eb"]))
 
 
-def _averages_out(seeds: Sequence[int]) -> Finding:
-    thrown = flights("hand_launch", seeds, tuned(launch_gate=PUBLISHED["launch_gate"]))
+@claim(Paper.THEORY, "Accelerometers", seeds=10)
+def forward_acceleration(seeds: Sequence[int]) -> Finding:
+    """Forward acceleration averages out.
+
+    Forward acceleration cannot be distinguished from gravity, but an aeroplane does not gain or lose speed for long:
+    the average is zero, and a slow correction can ignore it.
+    """
+    thrown = flights("hand_launch", seeds, UNGATED)
     cruising = flights("turns_180", seeds[: max(1, len(seeds) // 2)])
     peak = max(float(inclination_error_deg(flight).within(0.0, 5.0).value.max()) for flight in thrown)
-    felt = max(float(_felt_tilt_deg(flight)[_between(flight, -0.3, 0.0)].max()) for flight in thrown)
+    felt = max(float(_apparent_tilt_deg(flight)[_between(flight, -0.3, 0.0)].max()) for flight in thrown)
     later = pooled_rms(thrown, inclination_error_deg, RECOVERY_S)
     means = [_mean_over_deg(cruising, window_s) for window_s in WINDOWS_S]
     second, ten, long = (means[WINDOWS_S.index(w)] for w in (1.0, RECOVERY_S, 40.0))
 
-    def draw(figure: Figure) -> None:
-        launch, average = axes(figure, "Thrown: tilt the matrix is off by", "Flying: forward acceleration, averaged")
-        for flight in thrown:
-            shown = _between(flight, -0.3, 15.0)
-            launch.plot(time_s(flight)[shown], inclination_error_deg(flight).value[shown], color=BLUE, lw=0.8)
-        launch.axhline(felt, color=RED, lw=1, ls="--")
-        launch.annotate("what the accelerometer feels in the push", (15.0, felt - 5.5), color=RED, ha="right")
-        launch.set_ylim(0.0, felt + 8.0)
-        label(launch, "s after the release", "deg")
-        average.loglog(WINDOWS_S, means, "o-", color=BLUE)
-        average.set_xticks(WINDOWS_S, [f"{w:g}" for w in WINDOWS_S])
-        average.minorticks_off()
-        average.set_yticks((0.1, 0.3, 1.0, 3.0), ("0.1", "0.3", "1", "3"))
-        label(average, "averaged over, s", "feigned tilt, deg RMS")
-
+    throw = Panel("Hand launch: inclination error of the matrix", "deg", "s after the release", ylim=(0.0, felt + 8.0))
+    throw.flights(thrown, inclination_error_deg, BLUE, "", -0.3, 15.0)
+    throw.level(felt, RED)
+    throw.note("apparent inclination in the throw", 15.0, felt - 5.5, RED, ha="right")
+    average = Panel(
+        "Forward acceleration in flight",
+        "as inclination, deg RMS",
+        "window, s",
+        log="xy",
+        xticks=WINDOWS_S,
+        yticks=(0.1, 1),
+    )
+    average.curve(WINDOWS_S, means, BLUE, style="o-")
     return Finding(
-        stands=(
-            line("average over 40 s, as part of that over 1 s", "", long / second, "<=", 0.2),
-            line("average over 10 s, as tilt", "deg", ten, "<=", 2.0),
-            line("launch: largest tilt error, as part of what is felt", "", peak / felt, "<=", 0.25),
-            line("launch: tilt error 10 s later", "deg RMS", later, "<=", 4.0),
-        ),
-        told=f"In flight with turns the forward acceleration feigns {second:.1f} degrees over a second, {ten:.1f} over "
-        f"10 s and {long:.1f} over 40 s. The push of a launch feigns {felt:.0f} degrees, of which at most {peak:.0f} "
-        f"get into the matrix; 10 s later it is off by {later:.1f} degrees RMS.",
-        seeds=len(seeds),
-        draw=draw,
+        lines=[
+            line("average over 40 s, over that over 1 s", "", long / second, "<=", 0.2),
+            line("average over 10 s, as inclination", "deg", ten, "<=", 2.0),
+            line("launch: largest inclination error over apparent inclination", "", peak / felt, "<=", 0.25),
+            line("launch: inclination error after 10 s", "deg RMS", later, "<=", 4.0),
+        ],
+        summary=f"In flight with turns, forward acceleration looks like an inclination of {second:.1f} degrees over a "
+        f"second, {ten:.1f} over 10 s and {long:.1f} over 40 s. A launch looks like {felt:.0f} degrees, of which at "
+        f"most {peak:.0f} get into the matrix; from 10 s later, its error is {later:.1f} degrees RMS.",
+        panels=[throw, average],
     )
 
 
@@ -156,76 +162,34 @@ def _lock_s(flight: Flight) -> float:
     return settled_after_s(heading_error_deg("course")(flight).within(0.0, math.inf), LOCKED_DEG)
 
 
-def _yaw_lock(seeds: Sequence[int]) -> Finding:
-    times = {w: [_lock_s(flight) for flight in flights("hand_launch", seeds, tuned(w_y=w))] for w in WEIGHTS}
-    large = flights("hand_launch", seeds, tuned(w_y=LARGE))
+@claim(Paper.THEORY, "GPS, first reason for a large weight", seeds=10)
+def yaw_lock(seeds: Sequence[int]) -> Finding:
+    """A large yaw weight locks yaw shortly after take-off.
+
+    Before the aeroplane moves, its heading is unknown; with a large weight of the yaw correction it is found shortly
+    after take-off.
+    """
+    thrown = {w: flights("hand_launch", seeds, tuned(w_y=w)) for w in WEIGHTS}
+    times = {w: [_lock_s(flight) for flight in flown] for w, flown in thrown.items()}
     latest = {w: slowest(times[w]) for w in WEIGHTS}
-
-    def draw(figure: Figure) -> None:
-        course, by_weight = axes(figure, f"Heading after the release, W_Y = {LARGE:g}", "Locked, by weight")
-        for flight in large:
-            error = heading_error_deg("course")(flight).within(0.0, 8.0)
-            course.plot(error.t_s, error.value, color=BLUE, lw=1)
-        course.axhline(LOCKED_DEG, color=FAINT, ls="--", lw=1)
-        course.annotate("locked below 15 deg", (8.0, LOCKED_DEG + 4.0), color=FAINT, ha="right")
-        course.set_yticks((0.0, 45.0, 90.0, 135.0, 180.0))
-        label(course, "s after the release", "heading less course, deg")
-        for w in WEIGHTS:
-            found = [t for t in times[w] if math.isfinite(t)]
-            by_weight.plot([w] * len(found), found, "o", color=BLUE if w == LARGE else ORANGE, alpha=0.6, mew=0)
-            if len(found) < len(times[w]):
-                by_weight.annotate(f"{len(times[w]) - len(found)} never", (w, 18.4), ha="center", color=RED)
-        by_weight.set_xscale("log")
-        by_weight.set_xticks(WEIGHTS, [f"{w:g}" for w in WEIGHTS])
-        by_weight.minorticks_off()
-        by_weight.set_xlim(0.07, 3.4)
-        by_weight.set_ylim(0.0, 20.0)
-        by_weight.set_yticks((0.0, 5.0, 10.0, 15.0, 20.0))
-        label(by_weight, "weight of the yaw correction", "s after the release")
-
     gentle = sum(t > LOCK_SOON_S or math.isnan(t) for t in times[0.3])
+
+    course = Panel(f"Heading after the release, W_Y = {LARGE:g}", "minus course, deg", yticks=(0, 45, 90, 135, 180))
+    course.flights(thrown[LARGE], heading_error_deg("course"), BLUE, "", 0.0, 8.0)
+    course.level(LOCKED_DEG, text="locked below 15 deg")
+    by_weight = Panel("Time to lock", "s", "weight of the yaw correction", log="x", xticks=WEIGHTS, ylim=(0.0, 20.0))
+    for w in WEIGHTS:
+        found = [t for t in times[w] if math.isfinite(t)]
+        by_weight.cloud(w, found, BLUE if w == LARGE else ORANGE)
+        if len(found) < len(times[w]):
+            by_weight.note(f"{len(times[w]) - len(found)} never", w, 18.4, RED, ha="center")
     return Finding(
-        stands=(
-            line(f"slowest lock, W_Y = {LARGE:g}", "s", latest[LARGE], "<=", LOCK_SOON_S),
-            line("slowest lock, twice that weight", "s", latest[2.0 * LARGE], "<=", latest[LARGE]),
-        ),
-        told=f"Thrown in any direction with the heading unknown, yaw is within 15 degrees of the course after "
-        f"{float(np.median(times[LARGE])):.1f} s (the slowest after {latest[LARGE]:.1f} s) with a weight of {LARGE:g}. "
-        f"With 0.3 it takes up to {latest[0.3]:.0f} s, and {gentle} of {len(seeds)} take more than 5 s.",
-        seeds=len(seeds),
-        draw=draw,
+        lines=[
+            line(f"W_Y = {LARGE:g}: longest time to lock", "s", latest[LARGE], "<=", LOCK_SOON_S),
+            line("twice that weight: longest time to lock", "s", latest[2.0 * LARGE], "<=", latest[LARGE]),
+        ],
+        summary=f"After a launch in any direction with the heading unknown, yaw is within 15 degrees of the course "
+        f"after {float(np.median(times[LARGE])):.1f} s (at most {latest[LARGE]:.1f} s) with a weight of {LARGE:g}. "
+        f"With 0.3 it takes up to {latest[0.3]:.0f} s, and {gentle} of {len(seeds)} flights take more than 5 s.",
+        panels=[course, by_weight],
     )
-
-
-CLAIMS = (
-    Claim(
-        name="accelerometer_dives",
-        title="Thrown, an accelerometer alone dives and the matrix does not",
-        paper=Paper.THEORY,
-        place="Accelerometers",
-        says="Pitch held by the accelerometer alone takes the push of a hand launch for a climb and steers straight "
-        "down; the matrix, which the gyros carry, does not.",
-        expected=Verdict.CONFIRMED,
-        measure=_dives,
-    ),
-    Claim(
-        name="forward_acceleration",
-        title="Forward acceleration averages out",
-        paper=Paper.THEORY,
-        place="Accelerometers",
-        says="Forward acceleration cannot be told from gravity, but an aeroplane does not gain or lose speed for long: "
-        "on average it is nothing, and a slow correction can ignore it.",
-        expected=Verdict.CONFIRMED,
-        measure=_averages_out,
-    ),
-    Claim(
-        name="yaw_lock",
-        title="A large yaw weight locks yaw shortly after take-off",
-        paper=Paper.THEORY,
-        place="GPS, first reason for a large weight",
-        says="Nothing is known of the heading before the aeroplane moves; with a large weight of the yaw correction it "
-        "is found shortly after take-off.",
-        expected=Verdict.CONFIRMED,
-        measure=_yaw_lock,
-    ),
-)

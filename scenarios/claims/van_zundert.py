@@ -1,14 +1,13 @@
-"""Van Zundert's account of AP_AHRS_DCM: how near to the original a reading of it comes, and what the original was like.
+"""Van Zundert's description of AP_AHRS_DCM: how close an implementation of it comes to the original.
 
-The original of July 2013 is `estimator.ap_dcm` with all its quirks, which repeats what the firmware printed to 0.02
-degrees (the project's reference vectors).  "Set" and "added" are about the integral of section 3.2.
+The original of July 2013 is `estimator.ap_dcm` with all its quirks, which agrees with the output of the firmware within
+0.02 degrees (the project's reference vectors).  "Set" and "added" refer to the integral of section 3.2.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from estimator.ap_dcm import ApDcm, spin_gain
@@ -16,39 +15,40 @@ from estimator.blocks.kernels import wrap
 from estimator.interface import Array, Measurements
 from estimator.params.ap_dcm import JULY_2013, ApDcmParams, Quirk
 from estimator.rotation import propagate, renormalise, renormalise_exactly, to_euler
-from scenarios.harness.claims.claim import Claim, Finding, Paper, Verdict, line
-from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
+from scenarios.harness.claims.flights import clean_log
 from scenarios.harness.claims.motions import DECLINATION_RAD, felt_at_rest, seen, tilt_deg
-from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, axes, label
+from scenarios.harness.claims.picture import BLUE, GREEN, ORANGE, RED, Panel
 from scenarios.harness.metrics import highest, rms
 from sim.clock import Rates
 from sim.log import Log
 from sim.motion.prescribed_plant import HandHeld, Motion, Rest
 
-OFFSET_DEG_S = (0.8, -0.6, 0.5)  # of the gyros of the bench
+OFFSET_DEG_S = (0.8, -0.6, 0.5)  # of the gyros on the bench
 BY_HAND = HandHeld(math.radians(50.0), ((0.035, 0.08), (0.05, 0.09), (0.03, 0.07)))  # up to 90 degrees of tilt
 SPIN_LIMIT_RAD_S, LEARN_S, TARGET_DEG = math.radians(20.0), 5.0 + 1e-5, 0.5
 
 
 def bench(motion: Motion, duration_s: float, imu_hz: int) -> Log:
-    """Perfect sensors but for the gyros' offset, and no GPS."""
+    """Perfect sensors except for the gyro offset, without GPS."""
     log = seen(motion, duration_s, rates=Rates(imu_hz=imu_hz))
-    log.measured["gps_new"] = 0
-    log.measured["gyro_b_rad_s"] += np.radians(OFFSET_DEG_S)
-    return log
+    rows = log.measured.copy()
+    rows["gps_new"] = 0
+    rows["gyro_b_rad_s"] += np.radians(OFFSET_DEG_S)
+    return Log(log.truth, rows, log.flown)
 
 
 def original(quirks: frozenset[Quirk] = JULY_2013, *, flying: bool = False, compass: bool = True) -> ApDcm:
-    """July 2013, or with fewer quirks; on the bench it was a copter's."""
+    """The code of July 2013, or with fewer quirks; not flying: as for a copter."""
     params = ApDcmParams(quirks, declination_rad=DECLINATION_RAD, fly_forward=flying, use_magnetometer=compass)
     return ApDcm(params)
 
 
 def as_reported(rows: NDArray[np.void], *, set_integral: bool = True, earth_frame: bool = True) -> Array:
-    """Attitudes, shape (n, 3, 3), by the original with the integral of the report's section 3 in place of its own.
+    """Attitudes, shape (n, 3, 3), by the original with the integral of the report's section 3 instead of its own.
 
-    set_integral : the integral is set to the saturated sum, as the report has it; False adds to it, as the code does
-    earth_frame : the error is integrated in the earth frame, Eqn 3.12 as printed; False in the body frame
+    set_integral : the integral is set to the saturated sum, as in the report; False: it is added, as in the code
+    earth_frame : the error is integrated in the earth frame, Eqn 3.12 as printed; False: in the body frame
     """
     estimator = original()
     p = estimator.params
@@ -79,110 +79,77 @@ def as_reported(rows: NDArray[np.void], *, set_integral: bool = True, earth_fram
 
 
 def apart_deg(R_eb: Array, other_R_eb: Array) -> Array:
-    """Largest difference of the three Euler angles at each time, his measure; NaN near vertical pitch."""
+    """Largest difference of the three Euler angles at each time, the report's measure; NaN near vertical pitch."""
     angles, others = np.array(to_euler(R_eb)), np.array(to_euler(other_R_eb))
     largest = np.degrees(np.max(np.abs(wrap(angles - others)), axis=0))
     return np.where(np.abs(others[1]) < math.radians(85.0), largest, np.nan)
 
 
-def _half_degree(_seeds: Sequence[int]) -> Finding:
+@claim(Paper.VAN_ZUNDERT, "Chapter 1, research problem, and Chapter 5", expected=Verdict.WITH_CONDITION)
+def van_zundert_half_degree() -> Finding:
+    """The implementation agrees with the original within half a degree.
+
+    The aim is an implementation within half a degree of the original in every Euler angle; the result comes close but
+    misses it, perhaps because a function is not implemented correctly.
+    """
     log = bench(BY_HAND, 120.0, 100)
     true = original().replay(log.measured)["R_eb"]
     readings = {
         "as reported": {},
         "integral added, not set": {"set_integral": False},
         "error in the body frame": {"earth_frame": False},
-        "both put right": {"set_integral": False, "earth_frame": False},
+        "both corrected": {"set_integral": False, "earth_frame": False},
     }
     apart = {name: apart_deg(as_reported(log.measured, **reading), true) for name, reading in readings.items()}
-    worst = {name: float(np.nanmax(angle)) for name, angle in apart.items()}
+    reported, added, body_frame, both = (float(np.nanmax(angle)) for angle in apart.values())
 
-    def draw(figure: Figure) -> None:
-        (ax,) = axes(figure, "Two minutes turned by hand: Euler angles against the original's")
-        for (name, angle), colour in zip(apart.items(), (RED, ORANGE, BLUE, GREEN), strict=True):
-            ax.plot(log.truth["t_s"], angle, color=colour, lw=1.5, label=name)
-        ax.axhline(TARGET_DEG, color=FAINT, ls="--", lw=1)
-        ax.annotate("target", (-4.0, TARGET_DEG + 0.1), color=FAINT)
-        label(ax, "time, s", "largest difference, deg")
-        ax.legend(frameon=False, loc="upper left")
-
+    panel = Panel("Turned by hand: difference from the original", "largest Euler difference, deg")
+    panel.curves(log.truth["t_s"], apart, (RED, ORANGE, BLUE, GREEN), lw=1.5)
+    panel.level(TARGET_DEG, text="target")
     return Finding(
-        stands=(line("largest Euler difference, as reported", "deg", worst["as reported"], "<=", TARGET_DEG),),
-        told=f"Programmed as the report has it, the algorithm is up to {worst['as reported']:.1f} degrees from the "
-        f"original in two minutes of turning by hand: the target is missed, as he found. The code adds the saturated "
-        f"sum to the integral where the report sets it, and integrates in the body frame where Eqn 3.12 has the "
-        f"earth's. Either alone costs {worst['error in the body frame']:.1f} and "
-        f"{worst['integral added, not set']:.1f} degrees; with both put right it is the original.",
-        seeds=0,
-        draw=draw,
-        condition="if the integral is added to, and the error integrated in the body frame, as the code does",
-        under=(line("largest Euler difference, both put right", "deg", worst["both put right"], "<=", TARGET_DEG),),
-    )
-
-
-def _offset(_seeds: Sequence[int]) -> Finding:
-    log = bench(Rest(), 600.0, 50)
-    tilts = [tilt_deg(as_reported(log.measured, set_integral=way), log) for way in (True, False)]
-    set_to, added = (float(tilt[-1]) for tilt in tilts)
-
-    def draw(figure: Figure) -> None:
-        (ax,) = axes(figure, "At rest with gyros 0.8 and 0.6 deg/s off")
-        for tilt, name, colour in zip(
-            tilts, ("integral set, as reported", "added, as coded"), (RED, BLUE), strict=True
-        ):
-            ax.plot(log.truth["t_s"] / 60.0, tilt, color=colour, lw=2, label=name)
-        label(ax, "time, minutes", "tilt error, deg")
-        ax.legend(frameon=False)
-
-    return Finding(
-        stands=(line("tilt after 10 minutes at rest, integral set", "deg", set_to, "<=", 0.5),),
-        told=f"Set to its saturated sum, the integral never exceeds 0.04 deg/s: gyros 0.8 and 0.6 deg/s off in roll "
-        f"and pitch leave {set_to:.1f} degrees of tilt for ever ({_tilt_of_offset_deg():.1f} in closed form, what is "
-        f"left of the offset over k_P). Added to every 5 s, as the code does, it leaves {added:.2f} after 10 minutes.",
-        seeds=0,
-        draw=draw,
-        condition="if the saturated sum is added to the integral, as the code does",
-        under=(line("tilt after 10 minutes at rest, integral added to", "deg", added, "<=", 0.5),),
+        lines=[line("as reported: largest Euler difference", "deg", reported, "<=", TARGET_DEG)],
+        condition="if the integral is added and the error is integrated in the body frame, as in the code",
+        conditional_lines=[line("both corrected: largest Euler difference", "deg", both, "<=", TARGET_DEG)],
+        summary=f"Implemented as reported, the algorithm differs from the original by up to {reported:.1f} degrees in "
+        f"two minutes of turning by hand, so it misses the target, as he found. The code adds the saturated sum to the "
+        f"integral, where the report sets it, and integrates in the body frame, where Eqn 3.12 uses the earth frame. "
+        f"Either alone costs {body_frame:.1f} and {added:.1f} degrees; with both corrected it is the original.",
+        panels=[panel],
     )
 
 
 def _tilt_of_offset_deg() -> float:
-    """Tilt at which k_P times its sine is what an integral set to its limit leaves of the gyro offset."""
+    """Inclination at which k_P times its sine equals the gyro offset that an integral at its limit leaves."""
     p = ApDcmParams()
     left = [math.radians(abs(offset)) - p.gyro_drift_rad_s2 * 5.0 for offset in OFFSET_DEG_S[:2]]
     return math.degrees(math.asin(math.hypot(*left) / p.kp))
 
 
-def _spin_gain(_seeds: Sequence[int]) -> Finding:
-    spins = np.linspace(0.0, 600.0, 61)
-    mended = frozenset(JULY_2013 - {Quirk.STUCK_P_GAIN})
-    gains = {name: [_gain_at(spin, quirks) for spin in spins] for name, quirks in (("", JULY_2013), ("mended", mended))}
-    old, right = gains[""][50], gains["mended"][50]
-    changes = {"suite": "ideal", "air.wind_m_s": 0.0, "air.turbulence_w20_m_s": 0.0, "start.heading_deg": 0.0}
-    (flight,) = flights("loops", [0], changes, "sim.oracle:Oracle")
-    tilts = [
-        rms(tilt_deg(original(quirks, flying=True).replay(flight.log.measured)["R_eb"], flight.log)[500:])
-        for quirks in (JULY_2013, mended)
-    ]
+@claim(Paper.VAN_ZUNDERT, "Section 1.1, and 3.2 below Eqn 3.12", expected=Verdict.WITH_CONDITION)
+def van_zundert_offset() -> Finding:
+    """Proportional and integral feedback remove the gyro offset.
 
-    def draw(figure: Figure) -> None:
-        (ax,) = axes(figure, "By how much fast rotation raises the gain of the feedback")
-        ax.plot(spins, gains["mended"], color=BLUE, lw=2, label="with units put right")
-        ax.plot(spins, gains[""], color=RED, lw=2, label="code of July 2013")
-        label(ax, "rate of rotation, deg/s", "factor")
-        ax.set_ylim(0.0, 11.0)
-        ax.legend(frameon=False)
+    Errors from gyro offset are fed back by a proportional and integral controller; the integral is set equal to its
+    sum, limited to the possible drift of the gyro in the meantime.
+    """
+    log = bench(Rest(), 600.0, 50)
+    tilts = {
+        name: tilt_deg(as_reported(log.measured, set_integral=way), log)
+        for name, way in (("integral set, as reported", True), ("integral added, as in the code", False))
+    }
+    set_to, added = (float(tilt[-1]) for tilt in tilts.values())
 
+    panel = Panel("At rest with gyro offsets of 0.8 and 0.6 deg/s", "inclination error, deg", "time, minutes")
+    panel.curves(log.truth["t_s"] / 60.0, tilts, (RED, BLUE))
     return Finding(
-        stands=(
-            line("gain at 500 deg/s, code of July 2013", "", old, "<=", 1.0),
-            line("gain at 500 deg/s, units put right", "", right, ">=", 10.0),
-        ),
-        told=f"At 500 deg/s the code's gain is {old:.0f} and should be {right:.0f}; it would have to turn faster than "
-        f"2800 rad/s. Putting it right was no gain in flight: in three loops with perfect sensors the tilt error is "
-        f"{tilts[0]:.1f} degrees with the mistake and {tilts[1]:.1f} without.",
-        seeds=0,
-        draw=draw,
+        lines=[line("integral set: error after 10 minutes at rest", "deg", set_to, "<=", 0.5)],
+        condition="if the saturated sum is added to the integral, as in the code",
+        conditional_lines=[line("integral added: error after 10 minutes at rest", "deg", added, "<=", 0.5)],
+        summary=f"Set to its saturated sum, the integral never exceeds 0.04 deg/s: gyro offsets of 0.8 and 0.6 deg/s "
+        f"in roll and pitch cause a constant inclination error of {set_to:.1f} degrees ({_tilt_of_offset_deg():.1f} in "
+        f"closed form: the rest of the offset over k_P). If the sum is added every 5 s, as in the code, the error "
+        f"after 10 minutes is {added:.2f}.",
+        panels=[panel],
     )
 
 
@@ -192,141 +159,117 @@ def _gain_at(spin_deg_s: float, quirks: frozenset[Quirk]) -> float:
     return float(spin_gain(state[0]))
 
 
-def _normalisation(_seeds: Sequence[int]) -> Finding:
-    rates = np.geomspace(10.0, 400.0, 17)  # beyond, the second gives the series up
-    ways = {"exact, Eqns 2.4 to 2.6": renormalise_exactly, "Taylor series of 2009, Eqns 19 to 21": renormalise}
-    left = {name: np.array([_left_over(float(rate), way) for rate in rates]) for name, way in ways.items()}
-    (length, slant), (taylor_length, taylor_slant) = (_left_over(300.0, way) for way in ways.values())
+def _flown_tilts_deg(log: Log, quirks: frozenset[Quirk], settled: int, **settings: bool) -> Array:
+    """Inclination errors of an aeroplane's estimator over the log of a flight, after `settled` ticks."""
+    return tilt_deg(original(quirks, flying=True, **settings).replay(log.measured)["R_eb"], log)[settled:]
 
-    def draw(figure: Figure) -> None:
-        panels = axes(figure, "Rows that are not of unit length", "Rows that are not at right angles")
-        for i, (ax, what) in enumerate(zip(panels, ("largest error of a length", "largest cosine"), strict=True)):
-            for (name, values), colour in zip(left.items(), (BLUE, ORANGE), strict=True):
-                ax.loglog(rates, np.maximum(values[:, i], 1e-16), "o-", color=colour, ms=3, lw=1.5, label=name)
-            label(ax, "rate of rotation, deg/s", what)
-            ax.set_ylim(1e-17, 1.0)
-        panels[0].legend(frameon=False)
 
+@claim(Paper.VAN_ZUNDERT, "Section 3.1.2, below Eqn 3.4")
+def van_zundert_spin_gain() -> Finding:
+    """The gain that should increase with rotation is always one.
+
+    The gain compares a rate in rad/s with limits that were converted from degrees the wrong way, by mistake.
+    """
+    spins = np.linspace(0.0, 600.0, 61)
+    corrected = frozenset(JULY_2013 - {Quirk.STUCK_P_GAIN})
+    ways = {"units corrected": corrected, "code of July 2013": JULY_2013}
+    gains = {name: [_gain_at(spin, quirks) for spin in spins] for name, quirks in ways.items()}
+    right, old = (of[50] for of in gains.values())
+    log = clean_log("loops")
+    tilt_corrected, tilt_old = (rms(_flown_tilts_deg(log, quirks, 500)) for quirks in ways.values())
+
+    panel = Panel("Increase of the feedback gain with rotation", "factor", "rate of rotation, deg/s", ylim=(0.0, 11.0))
+    panel.curves(spins, gains, (BLUE, RED))
     return Finding(
-        stands=(
-            line("length of a row off 1 at 300 deg/s, exact", "", length, "<=", 1e-12),
-            line("the same by the Taylor series", "", taylor_length, ">=", 1e-12),
-        ),
-        told=f"Turning at 300 deg/s, 50 steps a second, the lengths of the rows are exact to {length:.0e}; by the "
-        f"Taylor series of 2009 to {taylor_length:.0e}. Their right angles are exact with neither: the largest cosine "
-        f"is {slant:.0e} and {taylor_slant:.0e}, for half the error is taken of rows that are not of unit length yet.",
-        seeds=0,
-        draw=draw,
+        lines=[
+            line("code of July 2013: gain at 500 deg/s", "", old, "<=", 1.0),
+            line("units corrected: gain at 500 deg/s", "", right, ">=", 10.0),
+        ],
+        summary=f"At 500 deg/s the gain of the code is {old:.0f} and should be {right:.0f}; it would increase only "
+        f"beyond 2800 rad/s. Correcting this does not help in flight: in three loops with perfect sensors the "
+        f"inclination error is {tilt_old:.1f} degrees with the mistake and {tilt_corrected:.1f} without.",
+        panels=[panel],
     )
 
 
-def _left_over(rate_deg_s: float, way: object) -> tuple[float, float]:
-    """Largest error of a row's length, and largest cosine between two, in 10 s of turning about a slanting axis."""
+def _left_over(rate_deg_s: float, way: Callable[[Array], object]) -> tuple[float, float]:
+    """Largest error of a row's length and largest cosine between two rows, in 10 s of turning about a tilted axis."""
     omega_b = math.radians(rate_deg_s) * np.ones(3) / math.sqrt(3.0)
     R, length, slant = np.eye(3), 0.0, 0.0
     for _ in range(500):
         propagate(R, omega_b, 0.02)
-        way(R)  # type: ignore[operator]
+        way(R)
         length = max(length, float(np.abs(np.linalg.norm(R, axis=1) - 1.0).max()))
         slant = max(slant, float(np.abs(np.triu(R @ R.T, 1)).max()))
     return length, slant
 
 
-def _sensors_decide(_seeds: Sequence[int]) -> Finding:
-    calm = {"suite": "ideal", "air.wind_m_s": 0.0, "air.turbulence_w20_m_s": 0.0, "start.heading_deg": 0.0}
-    flown = {
-        name: flights(scenario, [0], calm, "sim.oracle:Oracle")[0].log
-        for name, scenario in (("three turns", "turns_180"), ("three loops", "loops"))
-    }
+@claim(Paper.VAN_ZUNDERT, "Section 2.2")
+def van_zundert_normalisation() -> Finding:
+    """The normalisation is exact.
+
+    Each row is divided by its length, which is an exact normalisation, unlike the Taylor series of the paper of 2009.
+    """
+    rates = np.geomspace(10.0, 400.0, 17)  # beyond, the Taylor series fails
+    ways = {"exact, Eqns 2.4 to 2.6": renormalise_exactly, "Taylor series of 2009, Eqns 19 to 21": renormalise}
+    left = {name: np.array([_left_over(float(rate), way) for rate in rates]) for name, way in ways.items()}
+    (length, slant), (taylor_length, taylor_slant) = (_left_over(300.0, way) for way in ways.values())
+
+    panels = []
+    for i, (title, y) in enumerate((("Length of the rows", "largest error of a length"),
+                                    ("Angle between rows", "largest cosine"))):  # fmt: skip
+        panel = Panel(title, y, "rate of rotation, deg/s", log="xy", ylim=(1e-17, 1.0))
+        shown = {name: np.maximum(values[:, i], 1e-16) for name, values in left.items()}
+        panel.curves(rates, shown, (BLUE, ORANGE), "o-", ms=3, lw=1.5)
+        panels.append(panel)
+    return Finding(
+        lines=[
+            line("exact: error of a row's length at 300 deg/s", "", length, "<=", 1e-12),
+            line("Taylor series: error of a row's length at 300 deg/s", "", taylor_length, ">=", 1e-12),
+        ],
+        summary=f"When turning at 300 deg/s with 50 steps per second, the error of the lengths of the rows is "
+        f"{length:.0e}; with the Taylor series of 2009 it is {taylor_length:.0e}. Neither makes right angles exact: "
+        f"the largest cosine is {slant:.0e} and {taylor_slant:.0e}, because half of the error is computed with rows "
+        "that are not of unit length yet.",
+        panels=panels,
+    )
+
+
+@claim(Paper.VAN_ZUNDERT, "Chapter 1, research problem", expected=Verdict.WITH_CONDITION)
+def van_zundert_sensors_decide() -> Finding:
+    """The quality depends on the sensors, not on the algorithm.
+
+    Within half a degree of the original, the quality is determined by the accuracy of the sensors and not by the
+    algorithm.
+    """
+    flown = {"three turns": clean_log("turns_180"), "three loops": clean_log("loops")}
     hand = seen(BY_HAND, 120.0)
-    hand.measured["gps_new"] = 0
+    rows = hand.measured.copy()
+    rows["gps_new"] = 0
     copter = original()
     copter.reset(felt_at_rest(hand.truth["R_eb"][0]))
-    of_hand = tilt_deg(copter.replay(hand.measured)["R_eb"], hand)[1000:]
+    by_hand = highest(tilt_deg(copter.replay(rows)["R_eb"], hand)[1000:])
     july, none = (
-        {
-            name: tilt_deg(original(quirks, flying=True, compass=False).replay(log.measured)["R_eb"], log)[1000:]
-            for name, log in flown.items()
-        }
+        {name: _flown_tilts_deg(log, quirks, 1000, compass=False) for name, log in flown.items()}
         for quirks in (JULY_2013, frozenset[Quirk]())
     )
-    in_hand = line("largest tilt, turned by hand", "deg", highest(of_hand), "<=", TARGET_DEG)
+    in_hand = line("turned by hand: largest inclination error", "deg", by_hand, "<=", TARGET_DEG)
 
-    def draw(figure: Figure) -> None:
-        panels = axes(figure, "Three turns, perfect sensors", "Three loops")
-        for ax, name in zip(panels, flown, strict=True):
-            t_s = flown[name].truth["t_s"][1000:]
-            ax.plot(t_s, july[name], color=RED, lw=1.5, label="July 2013")
-            ax.plot(t_s, none[name], color=BLUE, lw=1.5, label="its quirks mended")
-            label(ax, "time, s", "tilt error, deg")
-        panels[0].legend(frameon=False)
-
+    panels = []
+    for name, log in flown.items():
+        panels.append(Panel(f"{name.capitalize()}, perfect sensors", "inclination error, deg"))
+        shown = {"July 2013": july[name], "quirks corrected": none[name]}
+        panels[-1].curves(log.truth["t_s"][1000:], shown, (RED, BLUE), lw=1.5)
     return Finding(
-        stands=(in_hand, *(line(f"largest tilt, {n}", "deg", highest(july[n]), "<=", TARGET_DEG) for n in flown)),
-        told=f"With perfect sensors the original is {highest(of_hand):.2f} degrees off at most when turned by hand, "
-        f"but {highest(july['three turns']):.1f} in an aeroplane's turns and {highest(july['three loops']):.0f} in "
-        f"loops: there the algorithm decides, not the sensors. With its quirks mended "
-        f"{highest(none['three turns']):.1f} and {highest(none['three loops']):.1f} are left.",
-        seeds=0,
-        draw=draw,
+        lines=[
+            in_hand,
+            *(line(f"{n}: largest inclination error", "deg", highest(july[n]), "<=", TARGET_DEG) for n in flown),
+        ],
         condition="if it is turned by hand, as on his bench, and not flown",
-        under=(in_hand,),
+        conditional_lines=[in_hand],
+        summary=f"With perfect sensors the inclination error of the original is at most {by_hand:.2f} degrees when "
+        f"turned by hand, but {highest(july['three turns']):.1f} in turns of an aeroplane and "
+        f"{highest(july['three loops']):.0f} in loops: there the algorithm decides, not the sensors. With its quirks "
+        f"corrected it is {highest(none['three turns']):.1f} and {highest(none['three loops']):.1f}.",
+        panels=panels,
     )
-
-
-CLAIMS = (
-    Claim(
-        name="van_zundert_half_degree",
-        title="Half a degree from the original",
-        paper=Paper.VAN_ZUNDERT,
-        place="Chapter 1, research problem, and Chapter 5",
-        says="The aim is an implementation within half a degree of the original in every Euler angle; the one made "
-        "comes near but misses it, perhaps for a function that is not implemented correctly.",
-        expected=Verdict.WITH_CONDITION,
-        measure=_half_degree,
-        seeds=0,
-    ),
-    Claim(
-        name="van_zundert_offset",
-        title="Proportional and integral feedback remove what the gyros are off",
-        paper=Paper.VAN_ZUNDERT,
-        place="Section 1.1, and 3.2 below Eqn 3.12",
-        says="Errors from gyro offset are fed back by a proportional and integral controller; the integral is set "
-        "equal to its sum, limited to what the gyro can have drifted meanwhile.",
-        expected=Verdict.WITH_CONDITION,
-        measure=_offset,
-        seeds=0,
-    ),
-    Claim(
-        name="van_zundert_spin_gain",
-        title="The gain that should grow with rotation is always one",
-        paper=Paper.VAN_ZUNDERT,
-        place="Section 3.1.2, below Eqn 3.4",
-        says="The gain compares a rate in rad/s with limits that were turned from degrees the wrong way, by mistake.",
-        expected=Verdict.CONFIRMED,
-        measure=_spin_gain,
-        seeds=0,
-    ),
-    Claim(
-        name="van_zundert_normalisation",
-        title="The normalisation is exact",
-        paper=Paper.VAN_ZUNDERT,
-        place="Section 2.2",
-        says="Each row is divided by its length, an exact normalisation in contrast to the Taylor series of the paper "
-        "of 2009.",
-        expected=Verdict.CONFIRMED,
-        measure=_normalisation,
-        seeds=0,
-    ),
-    Claim(
-        name="van_zundert_sensors_decide",
-        title="The sensors decide how good it is, not the algorithm",
-        paper=Paper.VAN_ZUNDERT,
-        place="Chapter 1, research problem",
-        says="Within half a degree of the original, the quality is determined by the accuracy of the sensors and not "
-        "by the algorithm.",
-        expected=Verdict.WITH_CONDITION,
-        measure=_sensors_decide,
-        seeds=0,
-    ),
-)

@@ -6,37 +6,37 @@ import numpy as np
 import pytest
 
 from scenarios.claims import centrifugal, course, latency, launch, upside_down, vertical_flight
-from scenarios.claims._flown import crab_deg, median, slowest
-from scenarios.claims._open_loop import aboard, begin, inclination_deg, sensed
 from scenarios.claims.centrifugal import Uncompensated
 from scenarios.claims.latency import Kink
 from scenarios.claims.upside_down import BANK_RAD, OnItsBack
 from scenarios.claims.vertical_flight import UpAndOn
-from scenarios.harness.claims.claim import Verdict
-from scenarios.harness.claims.flights import flights
+from scenarios.harness.claims.claim import Claim, Verdict
+from scenarios.harness.claims.flights import crab_deg, flights, median, slowest
+from scenarios.harness.claims.motions import aboard, begin, sensed, tilt_deg
+from scenarios.harness.claims.run import claims
 from sim.motion.prescribed_plant import SteadyTurn, inertial_rate_and_force
 from sim.place import LATITUDE_DEG
 
 MODULES = (launch, centrifugal, course, latency, upside_down, vertical_flight)
-CLAIMS = {claim.name: claim for module in MODULES for claim in module.CLAIMS}
+CLAIMS = {claim.name: claim for module in MODULES for claim in vars(module).values() if isinstance(claim, Claim)}
 
 
 @pytest.mark.parametrize("claim", CLAIMS.values(), ids=CLAIMS)
 def test_claim_is_well_formed(claim):
-    """Each tells what is said and where, and flies few seeds; no two are called alike."""
+    """Each has a title, a place and a claim, and needs few seeds; every one is found by its name."""
     assert claim.place
     assert claim.title
     assert not claim.title.endswith(".")
     assert claim.says.endswith(".")
     assert 0 <= claim.seeds <= 10
-    assert len(CLAIMS) == sum(len(module.CLAIMS) for module in MODULES)
+    assert claims()[claim.name] is claim
 
 
 @pytest.mark.parametrize("name", ["accelerometer_dives", "gps_filter_settles", "upside_down", "vertical_flight"])
 def test_cheap_claims_are_confirmed(name):
     """The verdict on two seeds is the one expected of ten."""
     finding = CLAIMS[name].measure((0, 1))
-    assert CLAIMS[name].expected == finding.verdict == Verdict.CONFIRMED, finding.stands
+    assert CLAIMS[name].expected == finding.verdict == Verdict.CONFIRMED, finding.lines
 
 
 def test_dive_claim_is_refuted_where_the_accelerometer_gets_a_matrix(monkeypatch):
@@ -65,9 +65,9 @@ def test_uncompensated_estimator_is_drawn_to_the_felt_vertical():
     log = sensed(turn, 60.0)
     weight = 0.3
     estimator = begin(Uncompensated(aboard(w_rp=weight, w_y=0.0, k_i=0.0)), log.truth["R_eb"][0])
-    tilt_deg = inclination_deg(estimator.replay(log.measured)["R_eb"], log)[-1]
+    measured_deg = tilt_deg(estimator.replay(log.measured)["R_eb"], log)[-1]
     expected_deg = 10.0 * weight / math.hypot(weight, turn.turn_rate_rad_s)
-    assert tilt_deg == pytest.approx(expected_deg, rel=0.03, abs=0)  # sine for angle: 0.5 %
+    assert measured_deg == pytest.approx(expected_deg, rel=0.03, abs=0)  # sine for angle: 0.5 %
 
 
 def test_turn_on_its_back_feels_its_weight_on_the_belly_side():

@@ -1,23 +1,36 @@
-"""A claim of a paper, and what became of it when it was put to the test.
+"""A claim of a paper, and how its verdict follows from measurements.
 
-A claim is measured, not argued: its `measure` flies or computes, and returns lines with limits, as a scenario does.
-The verdict follows from the lines alone:
+A claim is one function in a module of `scenarios.claims`.  The function's name is the name of the claim, its docstring
+holds the title and the claim in our own words, and it returns what was measured:
 
-confirmed                   every line of the claim as it stands holds
-confirmed with a condition  not every one of them does, but every line of the claim under its condition
-refuted                     neither
+    @claim(Paper.THEORY, "Accelerometers, above Eqn 25", expected=Verdict.REFUTED, seeds=3)
+    def ground_speed(seeds):
+        '''Ground speed can be used in the centrifugal term.
+
+        The ground speed can replace the speed along the nose, because the ground is an inertial frame.
+        '''
+        error = pooled_rms(flights("circle", seeds), inclination_error_deg, from_s=20.0)
+        return Finding(
+            [line("inclination error in a turn", "deg RMS", error, "<=", 5.0)],
+            f"In a steady turn the inclination error is {error:.1f} degrees RMS."
+        )
+
+The lines alone decide the verdict:
+
+confirmed                   every line holds
+confirmed with a condition  some line fails, but every line measured under the condition holds
+refuted                     otherwise
 """
 
+import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from scenarios.harness.checks import Row
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from scenarios.harness.claims.picture import Panel
+from sim.rows import Row
 
 
 class Paper(StrEnum):
@@ -36,7 +49,7 @@ class Paper(StrEnum):
 
 
 class Verdict(StrEnum):
-    """What became of a claim."""
+    """The result of testing a claim."""
 
     CONFIRMED = "confirmed"
     WITH_CONDITION = "confirmed with a condition"
@@ -44,56 +57,52 @@ class Verdict(StrEnum):
 
 
 def line(name: str, unit: str, measured: float, sense: Literal["<=", ">="], limit: float) -> Row:
-    """One measured value against the limit that the claim amounts to; NaN does not hold."""
+    """One measured value and its limit.  A value that is not finite fails."""
     passed = measured <= limit if sense == "<=" else measured >= limit
     return Row(name, unit, float(measured), sense, float(limit), bool(passed and math.isfinite(measured)))
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was measured of a claim.
+    """What was measured to test a claim.
 
-    stands      lines of the claim as it stands: at least one
-    condition   under what it holds, a phrase that begins with "if" or "with"; empty where none was tried
-    under       lines of the claim under that condition; none where there is none
-    told        what was found, one to three sentences with the numbers that matter, units included
-    seeds       over how many it was measured; 0 where nothing was left to chance
-    draw        draws the picture into an empty figure, see `scenarios.harness.claims.picture`
+    lines               measured values with their limits, at least one
+    summary             the result in one to three sentences, with the important numbers and their units
+    panels              the picture, see `scenarios.harness.claims.picture`
+    condition           when the claim holds, a phrase that begins with "if" or "with"; empty if none was tested
+    conditional_lines   values measured under that condition, with their limits
     """
 
-    stands: tuple[Row, ...]
-    told: str
-    seeds: int
-    draw: Callable[["Figure"], None]
+    lines: Sequence[Row]
+    summary: str
+    panels: Sequence[Panel] = ()
     condition: str = ""
-    under: tuple[Row, ...] = ()
+    conditional_lines: Sequence[Row] = ()
 
     def __post_init__(self) -> None:
-        if not self.stands:
-            raise ValueError("Finding.stands: no lines; a claim is judged by at least one")
-        if bool(self.condition) != bool(self.under):
-            raise ValueError(f"Finding.condition {self.condition!r}: give it with its lines, or neither")
+        if not self.lines:
+            raise ValueError("Finding.lines: empty; a claim needs at least one measured value with a limit")
+        if bool(self.condition) != bool(self.conditional_lines):
+            raise ValueError(
+                f"Finding.condition {self.condition!r}: needs conditional_lines, and they need a condition"
+            )
 
     @property
     def verdict(self) -> Verdict:
-        """See the module."""
-        if all(row.passed for row in self.stands):
+        """The verdict that follows from the lines, see the module."""
+        if all(row.passed for row in self.lines):
             return Verdict.CONFIRMED
-        return Verdict.WITH_CONDITION if self.under and all(row.passed for row in self.under) else Verdict.REFUTED
+        conditional = bool(self.conditional_lines) and all(row.passed for row in self.conditional_lines)
+        return Verdict.WITH_CONDITION if conditional else Verdict.REFUTED
 
-    def undrawn(self) -> "Finding":
-        """The same without its picture, which can be sent to another process."""
-        return replace(self, draw=_nothing)
+    @property
+    def deciding_line(self) -> Row:
+        """The first line that fails; if all hold, the one with the smallest margin."""
+        return next((row for row in self.lines if not row.passed), min(self.lines, key=_margin))
 
-
-def _nothing(figure: "Figure") -> None:
-    """Draw nothing."""
-
-
-def deciding(finding: Finding) -> Row:
-    """The line that decides: the first that does not hold, or of those that hold the one with the least margin."""
-    rows = finding.stands
-    return next((row for row in rows if not row.passed), min(rows, key=_margin))
+    def without_picture(self) -> "Finding":
+        """The finding without its panels, which cannot be sent to another process."""
+        return replace(self, panels=())
 
 
 def _margin(row: Row) -> float:
@@ -102,15 +111,15 @@ def _margin(row: Row) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A sentence of a paper that can be true or false.
+    """A testable claim of a paper, made by the decorator `claim`.
 
-    name        as typed on the command line, and the picture's file name
-    title       a short heading, as a person would put it
-    paper, place    where it stands: section, equation or page
-    says        the sentence, in our own words
-    expected    the verdict at the time of writing: another one is a regression
-    measure     of the seeds to fly; what leaves nothing to chance ignores them
-    seeds       how many are flown where nobody says otherwise
+    name            as typed on the command line; also the file name of the picture
+    title           short heading
+    paper, place    source: section, equation or page
+    says            the claim in our own words
+    expected        verdict when the claim was last reviewed; any other is a regression
+    seeds           number of seeds it is measured over by default; 0 if nothing is random
+    function        what measures it: takes the seeds, or nothing if nothing is random
     """
 
     name: str
@@ -119,9 +128,32 @@ class Claim:
     place: str
     says: str
     expected: Verdict
-    measure: Callable[[Sequence[int]], Finding] = field(repr=False)
-    seeds: int = 10
+    seeds: int
+    function: Callable[..., Finding] = field(repr=False)
 
-    def __post_init__(self) -> None:
-        if not self.name.isidentifier():
-            raise ValueError(f"claim name {self.name!r}: must be letters, digits and underscores")
+    def measure(self, seeds: Sequence[int]) -> Finding:
+        """Test the claim on `seeds`, which are ignored if nothing is random."""
+        return self.function(seeds) if self.seeds else self.function()
+
+
+def claim(
+    paper: Paper, place: str, *, expected: Verdict = Verdict.CONFIRMED, seeds: int = 0
+) -> Callable[[Callable[..., Finding]], Claim]:
+    """Make a `Claim` of the decorated function, see the module.
+
+    Raises
+    ------
+    ValueError      the docstring is not a title, an empty line and text, or the function does not take what it should
+    """
+
+    def made(function: Callable[..., Finding]) -> Claim:
+        name = function.__name__
+        title, _, says = (inspect.getdoc(function) or "").partition("\n\n")
+        if not title or not says:
+            raise ValueError(f"claim {name}: the docstring must be a title, an empty line and the claim")
+        takes, given = len(inspect.signature(function).parameters), 1 if seeds else 0
+        if takes != given:
+            raise ValueError(f"claim {name}: takes {takes} arguments; with seeds={seeds} it must take {given}")
+        return Claim(name, title.rstrip("."), paper, place, " ".join(says.split()), expected, seeds, function)
+
+    return made

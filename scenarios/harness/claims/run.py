@@ -1,30 +1,99 @@
-"""Claims put to the test over several processes.
+"""Find the claims and test them, in several processes.
 
-A claim is decided by its name and its seeds alone: the number of workers shows neither in a number nor in a picture.
+The result of a claim depends on its name and its seeds only, so numbers and pictures do not depend on the number of
+worker processes.
 """
 
-from collections.abc import Callable, Sequence
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import cache
+from types import MappingProxyType
 from typing import Any
 
-from scenarios.harness.claims.claim import Claim, Finding
-from scenarios.harness.claims.registry import claims
+import scenarios.claims
+from scenarios.harness.claims.claim import Claim, Finding, Paper
+from scenarios.harness.claims.picture import png
 from scenarios.harness.cli import console
 from scenarios.harness.gate.workers import fly_each
 from scenarios.harness.verdict import FAILED, PASSED, SIMULATION_FAILED
 from sim.log import Outcome
+from sim.params import near_misses
+
+# Sections of the theory that make claims, in their order.  Claims of the other papers keep the order of their modules.
+SECTIONS = (
+    "Introduction",
+    "Direction cosine matrices",
+    "Computing direction cosines from gyro signals",
+    "Renormalization",
+    "Drift cancellation",
+    "GPS",
+    "Accelerometers",
+    "Feedback controller",
+    "Gyro characteristics",
+    "Wind",
+    "Using DCM in control and navigation",
+)
+
+
+@cache
+def claims() -> Mapping[str, Claim]:
+    """All claims in `scenarios.claims` by name, in the order of the papers and of the sections of the theory.
+
+    Raises
+    ------
+    ValueError      two claims have the same name
+    """
+    found: dict[str, Claim] = {}
+    for info in sorted(pkgutil.iter_modules(scenarios.claims.__path__), key=lambda info: info.name):
+        module = importlib.import_module(f"scenarios.claims.{info.name}")
+        for claim in vars(module).values():
+            if not isinstance(claim, Claim):
+                continue
+            if found.get(claim.name, claim) is not claim:
+                raise ValueError(
+                    f"two claims are named {claim.name!r}: rename the one in scenarios/claims/{info.name}.py"
+                )
+            found[claim.name] = claim
+    return MappingProxyType({claim.name: claim for claim in sorted(found.values(), key=_position)})
+
+
+def _position(claim: Claim) -> tuple[int, int]:
+    """Number of the claim's paper, and of the section named at the beginning of its place."""
+    place = claim.place.casefold().replace("isation", "ization")
+    sections = [i for i, section in enumerate(SECTIONS) if place.startswith(section.casefold())]
+    return list(Paper).index(claim.paper), sections[0] if sections else len(SECTIONS)
+
+
+def matching(patterns: Iterable[str]) -> list[Claim]:
+    """The claims that match `patterns`, names or ``offset*``, in the order of `claims`; all if there are no patterns.
+
+    Raises
+    ------
+    ValueError      a pattern matches no claim
+    """
+    wanted = tuple(patterns)
+    for pattern in wanted:
+        if not any(fnmatchcase(name, pattern) for name in claims()):
+            raise ValueError(f"unknown claim {pattern!r}: {near_misses(pattern, claims())}")
+    return [claim for name, claim in claims().items() if not wanted or any(fnmatchcase(name, p) for p in wanted)]
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What became of one claim, as it comes back from a process.
+    """The result of one claim, as a worker process returns it.
 
-    finding     None where measuring it raised          picture     PNG; empty where none was wanted
-    problem     what was raised, in one line
+    finding     None if measuring it raised
+    seeds       number of seeds; 0 if nothing is random
+    picture     PNG; empty if none was wanted
+    problem     one-line error message if measuring it raised
     """
 
     name: str
     finding: Finding | None
+    seeds: int = 0
     picture: bytes = b""
     problem: str = ""
 
@@ -35,65 +104,61 @@ class Found:
 
     @property
     def as_expected(self) -> bool:
-        """Whether the verdict is the one that was expected."""
+        """Whether the verdict is the expected one."""
         return self.finding is not None and self.finding.verdict == self.claim.expected
 
     def to_json(self) -> dict[str, Any]:
-        """The claim and what was found, as plain data."""
+        """Claim and result as plain data."""
         claim, finding = self.claim, self.finding
-        told: dict[str, Any] = {
+        data: dict[str, Any] = {
             "claim": claim.name, "title": claim.title, "paper": str(claim.paper), "place": claim.place,
-            "says": claim.says, "expected": str(claim.expected),
+            "says": claim.says, "expected": str(claim.expected)
         }  # fmt: skip
         if finding is None:
-            return told | {"verdict": None, "problem": self.problem}
-        return told | {
+            return data | {"verdict": None, "problem": self.problem}
+        return data | {
             "verdict": str(finding.verdict),
-            "told": finding.told,
-            "seeds": finding.seeds,
-            "stands": [row.to_json() for row in finding.stands],
+            "summary": finding.summary,
+            "seeds": self.seeds,
+            "lines": [row.to_json() for row in finding.lines],
             "condition": finding.condition,
-            "under": [row.to_json() for row in finding.under],
+            "conditional_lines": [row.to_json() for row in finding.conditional_lines],
         }
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One claim to be put to the test, by name, so that it can be sent to a process."""
+    """One claim to test, by name, so that it can be sent to a worker process."""
 
     name: str
     seeds: tuple[int, ...]
     drawn: bool
 
     def fly(self) -> Found:
-        """Measure it, and draw its picture where one is wanted."""
+        """Test the claim, and draw its picture if `drawn`."""
         try:
             finding = claims()[self.name].measure(self.seeds)
-            picture = b""
-            if self.drawn:
-                from scenarios.harness.claims.picture import png
-
-                picture = png(finding.draw)
-        except Exception as error:  # whatever is wrong with one claim, the others are measured
+            picture = png(finding.panels) if self.drawn else b""
+        except Exception as error:  # an error in one claim does not stop the others
             why = " ".join(str(error).split()) or "no message"
             return Found(self.name, None, problem=f"{type(error).__name__}: {why}")
-        return Found(self.name, finding.undrawn(), picture)
+        return Found(self.name, finding.without_picture(), len(self.seeds), picture)
 
     def lost(self, outcome: Outcome, message: str) -> Found:
-        """What became of it where nothing came back."""
+        """The result if the worker process did not return one."""
         return Found(self.name, None, problem=f"{outcome.replace('_', ' ')}: {message}")
 
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What was found of all claims that were asked for, in their order; `n_planned` of them were."""
+    """Results of the `n_planned` claims that were to be tested, in their order."""
 
     found: tuple[Found, ...]
     n_planned: int
 
     @property
     def whole(self) -> bool:
-        """Whether none is missing; Ctrl-C and a worker that was killed leave some out."""
+        """Whether there is a result for every claim; Ctrl-C and killed workers leave claims out."""
         return len(self.found) == self.n_planned
 
     @property
@@ -103,7 +168,7 @@ class Findings:
 
     @property
     def exit_code(self) -> int:
-        """0 where every verdict is as expected, 1 where one is not, 3 where measuring raised, 130 interrupted."""
+        """0 if every verdict is as expected, 1 if one is not, 3 if measuring one raised, 130 if interrupted."""
         if not self.whole:
             return console.INTERRUPTED
         if not self.measured:
@@ -111,9 +176,9 @@ class Findings:
         return PASSED if all(found.as_expected for found in self.found) else FAILED
 
     def to_json(self) -> dict[str, Any]:
-        """All of it as plain data."""
-        told = {"passed": self.exit_code == PASSED, "claims": [found.to_json() for found in self.found]}
-        return told | ({} if self.whole else {"interrupted": True})
+        """All results as plain data."""
+        data = {"passed": self.exit_code == PASSED, "claims": [found.to_json() for found in self.found]}
+        return data | ({} if self.whole else {"interrupted": True})
 
 
 def measure(
@@ -125,17 +190,17 @@ def measure(
     drawn: bool = False,
     limit_s: float | None = None,
 ) -> Findings:
-    """Put the claims of `wanted` to the test.
+    """Test the claims of `wanted`.
 
     Parameters
     ----------
-    seeds       flown of each claim that leaves something to chance; None is from 0 on as many as each claim wants
-    advance     is told how many claims are done, of how many
-    drawn       whether their pictures are wanted
-    limit_s     wall-clock limit of each
+    seeds       for every claim that is not deterministic; None: each claim's own number of seeds, from 0
+    advance     called with the number of claims done and their total
+    drawn       whether to draw the pictures
+    limit_s     wall-clock limit for each claim
     """
     numbers = {c.name: tuple(range(c.seeds) if seeds is None or not c.seeds else seeds) for c in wanted}
-    # The long ones first, so that at the end no process waits for another.
+    # Claims with many seeds first, so that at the end no process waits long for another.
     tasks = [Task(c.name, numbers[c.name], drawn) for c in sorted(wanted, key=lambda c: -c.seeds)]
     done = fly_each(tasks, workers, advance, limit_s=limit_s)
     by_name = {found.name: found for found in done.values()}

@@ -234,21 +234,21 @@ def compare(
 def claims(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Claims, or patterns as offset*; all by default.", autocompletion=complete.claims),
+        typer.Argument(help="Claims, or patterns such as offset*. [default: all]", autocompletion=complete.claims),
     ] = None,
     seeds: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7. [default: of each claim]")
+        str | None, typer.Option(metavar="LIST", help="Seeds: 0-9 or 0,2,5-7. [default: as many as each claim needs]")
     ] = None,
     workers: WorkersOption = None,
     flight_timeout: FlightTimeoutOption = None,
-    list_only: Annotated[bool, typer.Option("--list", help="List the claims, and measure none.")] = False,
+    list_only: Annotated[bool, typer.Option("--list", help="List the claims without testing them.")] = False,
     pictures: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw them. [default: images beside the Markdown]")
+        Path | None, typer.Option(metavar="FOLDER", help="Draw pictures. [default: images/ beside the Markdown]")
     ] = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
-    """Test what the papers claim: each claim with its numbers, its verdict and its picture."""
+    """Test the claims of the papers: numbers, verdicts and pictures."""
     from scenarios.harness.commands import claims as command
 
     return command.run(

@@ -1,11 +1,10 @@
-"""`wingslevel claims`: measure claims, and write their page and pictures."""
+"""`wingslevel claims`: test claims, and write their page and pictures."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenarios.harness.claims import report as pages
-from scenarios.harness.claims.registry import matching
-from scenarios.harness.claims.run import measure
+from scenarios.harness.claims import page
+from scenarios.harness.claims.run import matching, measure
 from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import check_file, reporting, usage
 from scenarios.harness.gate.workers import processors
@@ -28,18 +27,18 @@ def run(
         with usage():
             wanted = matching(names)
             if list_only:
-                report(pages.listed(wanted))
-                pages.tell_list(wanted)
+                report(page.titles(wanted))
+                page.print_titles(wanted)
                 return 0
             check_file(markdown)
-            folder = pages.folder_of_pictures(markdown, pictures)
+            folder = page.picture_folder(markdown, pictures)
             numbers = None if seeds is None else parse_seeds(seeds)
             with console.progress("measuring", "claims") as advance:
                 findings = measure(
                     wanted, numbers, workers or processors(), advance, drawn=folder is not None, limit_s=limit_s
                 )
-        pages.write_all(findings, markdown, folder)
+        page.write_files(findings, markdown, folder)
         report(findings.to_json())
         # Last: a reader who closes the pipe loses no file.
-        pages.tell(findings, detailed=bool(names) and len(wanted) == 1)
+        page.print_report(findings, detailed=bool(names) and len(wanted) == 1)
     return findings.exit_code
