@@ -34,6 +34,8 @@ NOT_RUN = {
     r"make (fly|venv|lint|test)": "installs from the network; make test is what runs this",
     r"wingslevel view.*": "opens a window; without a display see test_view_command_of_the_readme",
     r"wingslevel fly hand_launch --live": "opens a window",
+    r"(cc|c\+\+|rustc) .*": "needs a compiler; tests/packaging/test_c_page.py runs it where there is one",
+    r"wingslevel fly crosswind --estimator \./mine(_cpp|_rust)?\.so.*": "the same",
     r"pytest test_my_filter.py": "needs the plugin",
     r"wingslevel claims( --markdown docs/claims.md)?": "takes minutes; tests/unit/test_claims.py compares the page",
 }
@@ -43,7 +45,7 @@ SHORTER = {
     r"(wingslevel check) (--json verdict.json)": r"\1 hand_launch --seeds 0 --workers 1 \2",
     r"(wingslevel check) (--estimator my_filter.py:\w+) (--junit .*)": r"\1 hand_launch --seeds 0 --workers 1 \2 \3",
 }
-COMING = ("api.md", "c_estimators.md", "pytest.md", "scenarios.md")
+COMING = ("api.md", "pytest.md", "scenarios.md")
 # What a page takes for granted: commands that are run before it.
 BEFORE = {
     "docs/replay.md": ["wingslevel fly hand_launch --no-rerun", "wingslevel export --csv flight.csv"],
@@ -86,7 +88,8 @@ def commands_of(block: Block) -> list[str]:
 
 def every_command() -> list[str]:
     """All commands of all documents."""
-    return [command for document in DOCUMENTS for block in blocks_of(document) for command in commands_of(block)]
+    pages = (document for document in DOCUMENTS if document not in OWN_TESTS)
+    return [command for page in pages for block in blocks_of(page) for command in commands_of(block)]
 
 
 def shown_files() -> dict[str, str]:
@@ -147,7 +150,7 @@ def test_exceptions_are_all_needed() -> None:
     assert sum(not is_left_out(command) for command in every) > 0.75 * len(every)
 
 
-@pytest.mark.parametrize("document", [d for d in DOCUMENTS if any(b.language != "text" for b in blocks_of(d))])
+@pytest.mark.parametrize("document", [d for d in DOCUMENTS if d not in OWN_TESTS and blocks_of(d)])
 def test_blocks_of_a_document_run_in_order(document: str, here: Path) -> None:
     """Commands, Python and data of a page, from top to bottom, in a folder of their own."""
     for command in BEFORE.get(document, ()):
