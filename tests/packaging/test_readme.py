@@ -89,8 +89,7 @@ def commands_of(block: Block) -> list[str]:
 
 def every_command() -> list[str]:
     """All commands of all documents."""
-    pages = (document for document in DOCUMENTS if document not in OWN_TESTS)
-    return [command for page in pages for block in blocks_of(page) for command in commands_of(block)]
+    return [command for document in DOCUMENTS for block in blocks_of(document) for command in commands_of(block)]
 
 
 def shown_files() -> dict[str, str]:
@@ -152,7 +151,7 @@ def test_exceptions_are_all_needed() -> None:
     assert len(not_run) < 0.25 * len(every)
 
 
-@pytest.mark.parametrize("document", [d for d in DOCUMENTS if d not in OWN_TESTS and blocks_of(d)])
+@pytest.mark.parametrize("document", [d for d in DOCUMENTS if blocks_of(d)])
 def test_blocks_of_a_document_run_in_order(document: str, here: Path) -> None:
     """Commands, Python and data of a page, from top to bottom, in a folder of their own."""
     for command in BEFORE.get(document, ()):
