@@ -35,8 +35,8 @@ def fly(
     Parameters
     ----------
     scenario        name, ``file.py``, or a `Scenario`
-    estimator       registered name, ``module:Class``, ``file.py:Class``, a class, or a function that makes a new one;
-                    None is the one of the scenario
+    estimator       registered name, ``module:Class``, ``file.py:Class``, ``library.so``, a class, or a function that
+                    makes a new one; None is the one of the scenario
     params          its parameters by name
     seed            another seed, another flight; the same seed, the same bits.  None is that of the scenario, 0
     timeout         wall-clock limit, seconds; the flight then ends as "timed_out"
@@ -95,7 +95,7 @@ def _warn_of_faults(config: "FlightConfig") -> None:
 
     for fault in never_met(config.faults, config.held_s, config.duration_s):
         lasts = f"the flight lasts from {-config.held_s:g} s to {config.duration_s:g} s after the release"
-        warnings.warn(f"fault {fault} is never met: {lasts}", WingslevelWarning, stacklevel=3)
+        warnings.warn(f"fault {fault} never happens: {lasts}", WingslevelWarning, stacklevel=3)
 
 
 def load(path: str | os.PathLike[str]) -> Flight:
