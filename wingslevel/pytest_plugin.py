@@ -256,7 +256,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
     if not groups:
         return
     terminalreporter.write_sep("=", "flights")
-    rows = [("", "passed", "inclination RMS", "heading RMS")]
+    rows: list[tuple[str, ...]] = [("", "passed", "inclination RMS", "heading RMS")]
     rows += [
         (name, f"{sum(ok for ok, _ in each)} of {len(each)}", *(_rms(each, number) for number in _NUMBERS))
         for name, each in sorted(groups.items())

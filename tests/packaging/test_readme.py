@@ -11,6 +11,7 @@ import sys
 import sysconfig
 import tomllib
 from collections.abc import Callable
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,7 +35,6 @@ NOT_RUN = {
     r"make (fly|venv|lint|test)": "installs from the network; make test is what runs this",
     r"wingslevel view.*": "opens a window; without a display see test_view_command_of_the_readme",
     r"wingslevel fly hand_launch --live": "opens a window",
-    r"pytest test_my_filter.py": "needs the plugin",
     r"wingslevel list scenarios --markdown .*": "writes into docs/; tests/unit/test_scenario_page.py runs it",
     r"wingslevel claims( --markdown docs/claims.md)?": "takes minutes; tests/unit/test_claims.py compares the page",
 }
@@ -46,7 +46,7 @@ SHORTER = {
     r"(wingslevel check) (--json verdict.json)": r"\1 hand_launch --seeds 0 --workers 1 \2",
     r"(wingslevel check) (--estimator my_filter.py:\w+) (--junit .*)": r"\1 hand_launch --seeds 0 --workers 1 \2 \3",
 }
-COMING = ("api.md", "pytest.md")
+COMING = ("api.md",)
 # What a page takes for granted: commands that are run before it.
 BEFORE = {
     "docs/replay.md": ["wingslevel fly hand_launch --no-rerun", "wingslevel export --csv flight.csv"],
@@ -113,6 +113,10 @@ def execute(command: str) -> None:
     """Run a command as shown, or its shorter form: a flight may fail a check, nothing else."""
     for pattern, instead in SHORTER.items():
         command = re.sub(f"^{pattern}$", instead, command)
+    if not any(
+        point.name == "wingslevel" for point in entry_points(group="pytest11")
+    ):  # not installed since it has one
+        command = re.sub("^pytest ", "pytest -p wingslevel.pytest_plugin ", command)
     program, *arguments = shlex.split(os.path.expandvars(command))
     if program == "wingslevel":
         assert run(arguments) in (0, 1), command
