@@ -131,7 +131,7 @@ def sensors(name: AnyPath | None = None, *, progress: Progress = False) -> dict[
     with quietly(), progress_of(progress, "lying still", "axis-hours") as advance:
         about = sensor_names.subject(os.fspath(name))
         command.check_rates(about, os.fspath(name))
-        made = command.make(about, advance)
+        made = command.make(about, lambda done, total: advance(done, total))
 
     def draw(path: Path) -> None:
         from scenarios.harness.commands import sensors_picture
