@@ -158,12 +158,11 @@ def reported_velocity() -> Finding:
     )
     (turn, loops), (turn_matched, loops_matched) = (map(rms, tilts.values()) for tilts in (as_reported, matched))
 
-    panels = [
-        Panel(name, "inclination error, deg", ylim=(0.0, top)) for name, top in zip(logs, (4.0, None), strict=True)
-    ]
-    for panel, (name, log) in zip(panels, logs.items(), strict=True):
+    panels = []
+    for (name, log), legend in zip(logs.items(), ("best", ""), strict=True):
+        panels.append(Panel(name, "inclination error, deg", legend=legend, ylim=(0.0, 4.0 if legend else None)))
         tilts = {"late reports as they are": as_reported[name], "accelerometer filtered and delayed": matched[name]}
-        panel.curves(log.truth["t_s"][500:], tilts, (RED, BLUE), lw=1.5)
+        panels[-1].curves(log.truth["t_s"][500:], tilts, (RED, BLUE), lw=1.5)
     return Finding(
         lines=[
             line("35 deg of bank: error, velocities as reported", "deg RMS", turn, "<=", 1.0),
