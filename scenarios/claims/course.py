@@ -125,7 +125,9 @@ def crosswind_reversal(seeds: Sequence[int]) -> Finding:
         else "most flights end before the heading stays within 10 degrees of the course"
     )
 
-    panel = Panel("Reversal: heading minus course", "crab angles", "s after the turn begins", xlim=(-20.0, 58.0))
+    panel = Panel(
+        "Heading minus course", "crab angles", "s after the turn begins", xlim=(-20.0, 58.0), ylim=(-1.2, 2.6)
+    )
     for flown, colour, w_y in ((small, RED, SMALL), (large, BLUE, LARGE)):
         curves = []
         for flight in flown:
