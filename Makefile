@@ -1,4 +1,4 @@
-# Works with nothing but Python >= 3.11, pip and make:  make fly   make test
+# Requires Python >= 3.11, pip and make:  make fly   make test
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -6,12 +6,12 @@ STAMP := $(VENV)/.installed
 WORKERS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help venv fly test proofs fuzz mutants lint clean
+.PHONY: help venv fly test test-long fuzz mutants lint clean
 
-help:  ## what can be made
-	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 10
+help:  ## list the targets
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
 
-venv: $(STAMP)  ## set up .venv: the project, editable, with its development tools
+venv: $(STAMP)  ## create .venv with the project, editable, and its development tools
 
 # Dependency groups need pip >= 25.1, which a system Python seldom brings; Debian's brings no pip for a venv at all.
 $(STAMP): pyproject.toml
@@ -35,16 +35,16 @@ lint: venv  ## style, types, layers
 test: lint  ## set up, lint, and run all tests
 	$(BIN)/pytest -n $(WORKERS)
 
-proofs: venv  ## the long proofs: hundreds of command lines, kills and bent files
+test-long: venv  ## the long tests: hundreds of command lines, kills and damaged files
 	$(BIN)/pytest -n $(WORKERS) -m long
 
-fuzz: venv  ## search on where the tests draw examples: an hour, with others each time
+fuzz: venv  ## test with other random examples, for an hour
 	HYPOTHESIS_PROFILE=explore $(BIN)/pytest -n $(WORKERS) -m hypothesis
 	@end=$$(( $$(date +%s) + 3600 )); while [ $$(date +%s) -lt $$end ]; do \
 		WINGSLEVEL_FUZZ_SEED=$$(date +%s) $(BIN)/pytest -n $(WORKERS) -m long tests/fuzz || exit 1; done
 
-mutants: venv  ## are the tests tested? 200 flipped signs and comparisons, one by one; takes hours, goes on where it was
+mutants: venv  ## mutation tests: 200 flipped signs and comparisons; takes hours, continues where it stopped
 	nice $(BIN)/python tests/mutants --number 200 --seed 1 --jobs $(WORKERS)
 
-clean:  ## remove what was made here, the virtual environment included
+clean:  ## remove build products and the virtual environment
 	rm -rf $(VENV) flights dist build .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis

@@ -9,7 +9,7 @@ from wingslevel._errors import WingslevelError
 
 Number = float | int | str  # NumPy's numbers too
 Estimator = str | os.PathLike[str] | Callable[..., Any]
-"""A registered name, ``module:Class``, ``file.py:Class``, a class, or a function that makes a new one."""
+"""Registered name, ``module:Class``, ``file.py:Class``, ``library.so``, a class, or a function that makes a new one."""
 
 
 class Conditions(TypedDict, total=False):

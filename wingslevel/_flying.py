@@ -35,8 +35,8 @@ def fly(
     Parameters
     ----------
     scenario        name, ``file.py``, or a `Scenario`
-    estimator       registered name, ``module:Class``, ``file.py:Class``, a class, or a function that makes a new one;
-                    None is the one of the scenario
+    estimator       registered name, ``module:Class``, ``file.py:Class``, ``library.so``, a class, or a function that
+                    makes a new one; None is the one of the scenario
     params          its parameters by name
     seed            another seed, another flight; the same seed, the same bits.  None is that of the scenario, 0
     timeout         wall-clock limit, seconds; the flight then ends as "timed_out"

@@ -212,12 +212,12 @@ def class_of_library(file: Library) -> type[CEstimator]:
         "Params",
         [
             (name, bool, field(default=bool(default))) if name in BOOLEAN else
-            (name, float, field(default=default, metadata={"unit": unit, "doc": doc}))
+            (name, float, field(default=default))
             for name, unit, default, doc in described.parameters
         ],
         frozen=True,
     )  # fmt: skip
-    lines = [f"{name} : float   {unit}, {doc}" for name, unit, _, doc in described.parameters]
+    lines = [f"{name} : {unit}  {doc}" for name, unit, _, doc in described.parameters]  # as `harness.parameters` reads
     params.__doc__ = "\n".join([f"Parameters of {file.path.name}.", "", *lines])
     members = {
         "__doc__": described.doc or f"The estimator of {file.path.name}.",
@@ -315,7 +315,8 @@ def _described(functions: _Functions, of: Library) -> _Described:
         parameter = _identifier(file, f"parameter {i}", p.name)
         if parameter in [name for name, *_ in parameters]:
             raise Refused(f"{file}: two parameters are called {parameter}")
-        parameters.append((parameter, _text(p.unit), float(p.default_value), _text(p.doc)))
+        unit = "switch" if parameter in BOOLEAN else _text(p.unit).replace(" ", "_") or "-"
+        parameters.append((parameter, unit, float(p.default_value), _text(p.doc)))
     uses = tuple(name for bit, name in enumerate(_INSTRUMENTS) if d.uses >> bit & 1)
     static = bool(d.flags & STATIC_STATE)
     return _Described(name, _text(d.doc), _REFERENCES[d.heading_reference], uses, static, tuple(parameters))

@@ -76,7 +76,7 @@ def killed_at_random(here: Path, kills: int, seed: int, longest_s: float) -> Non
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc")
 def test_check_killed_at_random_moments_goes_on_where_it_was(tmp_path: Path) -> None:
-    """A few moments; the proofs try a hundred."""
+    """A few moments; the long tests try a hundred."""
     killed_at_random(tmp_path, 4, seed=1, longest_s=6.0)
 
 

@@ -21,6 +21,7 @@ from scenarios.harness.c_library import ESTIMATE, MEASUREMENTS
 from scenarios.harness.cli.app import run
 from scenarios.harness.flight import fly_scenario, prepare
 from scenarios.harness.gate import sources
+from scenarios.harness.parameters import Parameter, estimator_parameters
 from scenarios.harness.plugins import PluginError, equipped, load_estimator, parameters_of, short_name
 from scenarios.harness.registry import find
 from scenarios.harness.replay import replay
@@ -70,7 +71,8 @@ SOURCE = r"""
 FUNCTIONS(PREFIX)
 
 static const wingslevel_parameter PARAMETERS[] = {
-    {"k_p", "1/s", 0.5, "raised: quicker"}, {SECOND, "s", 0.3, "of the receiver"}, {"use_airspeed", "", 0.0, "a flag"}};
+    {"k_p", "1/s", 0.5, "gain higher: quicker; lower: steadier"},
+    {SECOND, "s", 0.3, "of the receiver"}, {"use_airspeed", "", 0.0, "a flag"}};
 static const wingslevel_description DESCRIPTION = {SIZE, VERSION, NAME, "Always level.", REFERENCE, USES, FLAGS,
     sizeof(wingslevel_parameter), 3, PARAMETERS};
 int living;
@@ -267,8 +269,9 @@ def test_class_of_a_library_says_what_the_library_says(level):
     assert type(estimator).__doc__ == "Always level."
     assert parameters_of(str(level())) == {"k_p", "gps_latency_s", "use_airspeed"}
     assert (estimator.params.k_p, estimator.params.use_airspeed) == (0.5, False)
-    assert estimator.params.__dataclass_fields__["k_p"].metadata == {"unit": "1/s", "doc": "raised: quicker"}
-    assert "k_p : float   1/s, raised: quicker" in type(estimator.params).__doc__
+    k_p, latency, flag = estimator_parameters(str(level()))
+    assert k_p == Parameter("k_p", 0.5, "1/s", "gain", "quicker", "steadier")
+    assert (latency.unit, latency.meaning, flag.unit, flag.default) == ("s", "of the receiver", "switch", False)
 
 
 def test_estimate_that_sets_the_attitude_alone_has_the_usual_rest(level):
@@ -413,11 +416,11 @@ def test_prefix_names_one_of_several_estimators_of_a_library(level):
     [
         ("return 3", "update returned 3, must return 0"),
         ("e->R_eb[0][0]=NAN", "R_eb is not finite"),
-        ("e->R_eb[0][0]=2", "R_eb is no rotation"),
-        ("e->health=9", "health is no Health"),
+        ("e->R_eb[0][0]=2", "R_eb is not a rotation"),
+        ("e->health=9", "health is"),
         ("e->omega_b_rad_s[1]=INFINITY", "omega_b_rad_s is not finite"),
         ("e->wind_e_m_s[0]=1e30", "wind_e_m_s is beyond"),
-        ("e->rejected=0;memset(e->R_eb,0,72)", "R_eb is no rotation"),
+        ("e->rejected=0;memset(e->R_eb,0,72)", "R_eb is not a rotation"),
     ],
 )
 def test_answer_that_is_none_ends_the_flight_as_failed(level, wrong, says):

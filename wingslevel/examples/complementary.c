@@ -31,11 +31,11 @@ WINGSLEVEL_ESTIMATOR(wingslevel)
 enum { TILT_S, HEADING_S, BIAS_S, GPS_LATENCY_S, GPS_FILTER_S, N_PARAMETERS };
 
 static const wingslevel_parameter PARAMETERS[N_PARAMETERS] = {
-    {"tilt_s", "s", 5.0, "time constant of the tilt; raised: smoother, slower; lowered: follows accelerations"},
-    {"heading_s", "s", 2.0, "the same for the heading; raised: less course noise; lowered: found sooner"},
-    {"bias_s", "s", 20.0, "the same for the gyro bias; raised: steadier; lowered: overshoots, keep above 4 tilt_s"},
-    {"gps_latency_s", "s", 0.3, "age of a fix on arrival; wrong: the heading lags or leads in turns"},
-    {"gps_filter_s", "s", 0.0, "time constant of the receiver's velocity filter; likewise"},
+    {"tilt_s", "s", 5.0, "time constant of the tilt correction higher: smoother; lower: follows accelerations too"},
+    {"heading_s", "s", 2.0, "time constant of the heading correction higher: less course noise; lower: found sooner"},
+    {"bias_s", "s", 20.0, "time constant of the gyro bias higher: steadier; lower: overshoots, keep above 4 tilt_s"},
+    {"gps_latency_s", "s", 0.3, "age of a fix on arrival higher: more of the turn since then is added; lower: less"},
+    {"gps_filter_s", "s", 0.0, "time constant of the receiver's filter higher: as for the latency; lower: likewise"},
 };
 
 static const wingslevel_description DESCRIPTION = {

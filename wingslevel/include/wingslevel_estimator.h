@@ -69,7 +69,7 @@ typedef struct wingslevel_parameter {
     const char *name;     /* an identifier, with its unit: "gps_latency_s" */
     const char *unit;     /* "s"; "" if it has none */
     double default_value; /* of a flag: 0 or 1 */
-    const char *doc;      /* one line: what it means, what happens when it is raised and when it is lowered */
+    const char *doc;      /* one line: "time constant of the tilt higher: smoother; lower: recovers sooner" */
 } wingslevel_parameter;
 
 /* What the library is.  It and all that it points to live as long as the library. */

@@ -30,7 +30,7 @@ ParamsOption = Annotated[bool, typer.Option("--params", help="The parameters of 
 EstimatorOption = Annotated[
     str | None,
     typer.Option(
-        "--estimator", metavar="NAME", help="Registered name, module:Class or file.py:Class.",
+        "--estimator", metavar="NAME", help="Registered name, module:Class, file.py:Class or library.so.",
         autocompletion=complete.estimators,
     ),
 ]  # fmt: skip
@@ -157,7 +157,7 @@ ParameterOption = Annotated[
 LogEstimatorsOption = Annotated[
     str,
     typer.Option(
-        "--estimator", metavar="NAME,...", help="Registered names, module:Class or file.py:Class.",
+        "--estimator", metavar="NAME,...", help="Registered names, module:Class, file.py:Class or library.so.",
         autocompletion=complete.estimators,
     ),
 ]  # fmt: skip

@@ -135,7 +135,7 @@ AnyStart = InFlightStart | HandThrowStart | BenchStart
 class FlightConfig(_Model):
     """Everything that decides a flight, apart from the code.
 
-    estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``
+    estimator, autopilot : a registered name, ``module:Class`` or ``file.py:Class``; an estimator also ``library.so``
     estimator_params : fields of the estimator's parameter dataclass
     instruments : properties of the instruments set by the user, ``{"gps_latency_s": 1.0}``: every estimator and
     autopilot with a parameter of that name gets them instead of the figures of the suite
