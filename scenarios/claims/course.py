@@ -126,7 +126,7 @@ def crosswind_reversal(seeds: Sequence[int]) -> Finding:
     )
 
     panel = Panel(
-        "Heading minus course", "crab angles", "s after the turn begins", xlim=(-20.0, 58.0), ylim=(-1.2, 2.6)
+        "Reversal: heading minus course", "crabs", "s after the turn begins", xlim=(-20.0, 58.0), ylim=(-1.2, 2.6)
     )
     for flown, colour, w_y in ((small, RED, SMALL), (large, BLUE, LARGE)):
         curves = []
