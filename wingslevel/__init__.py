@@ -54,11 +54,16 @@ if TYPE_CHECKING:
         MagSample,
         Measurements,
     )
+    from wingslevel._arrays import AirArrays, GpsArrays, MagArrays, estimate
+    from wingslevel._attitudes import Attitudes
+    from wingslevel._campaigns import check, compare
     from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning
     from wingslevel._flight import Flight
     from wingslevel._flying import fly, load
-    from wingslevel._names import autopilots, estimators, scenarios
+    from wingslevel._names import autopilots, estimators, parameters, scenarios
     from wingslevel._pages import export, view
+    from wingslevel._replaying import Replay, replay
+    from wingslevel._results import CheckResult, Comparison
     from wingslevel.include import get_include
 
     __version__: str
@@ -70,35 +75,52 @@ _HOMES = {
         "AirData", "AttitudeEstimate", "AttitudeEstimator", "GpsFix", "Health", "ImuSample", "MagSample",
         "Measurements",
     ),
+    "wingslevel._arrays": ("AirArrays", "GpsArrays", "MagArrays", "estimate"),
+    "wingslevel._attitudes": ("Attitudes",),
+    "wingslevel._campaigns": ("check", "compare"),
     "wingslevel._errors": ("Interrupted", "WingslevelError", "WingslevelWarning"),
     "wingslevel._flight": ("Flight",),
     "wingslevel._flying": ("fly", "load"),
-    "wingslevel._names": ("autopilots", "estimators", "scenarios"),
+    "wingslevel._names": ("autopilots", "estimators", "parameters", "scenarios"),
     "wingslevel._pages": ("export", "view"),
+    "wingslevel._replaying": ("Replay", "replay"),
+    "wingslevel._results": ("CheckResult", "Comparison"),
     "wingslevel.include": ("get_include",),
 }  # fmt: skip
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "AirArrays",
     "AirData",
     "AttitudeEstimate",
     "AttitudeEstimator",
+    "Attitudes",
+    "CheckResult",
+    "Comparison",
     "Flight",
+    "GpsArrays",
     "GpsFix",
     "Health",
     "ImuSample",
     "Interrupted",
+    "MagArrays",
     "MagSample",
     "Measurements",
+    "Replay",
     "WingslevelError",
     "WingslevelWarning",
     "__version__",
     "autopilots",
+    "check",
+    "compare",
+    "estimate",
     "estimators",
     "export",
     "fly",
     "get_include",
     "load",
+    "parameters",
+    "replay",
     "scenarios",
     "view",
 ]

@@ -95,7 +95,7 @@ def _warn_of_faults(config: "FlightConfig") -> None:
 
     for fault in never_met(config.faults, config.held_s, config.duration_s):
         lasts = f"the flight lasts from {-config.held_s:g} s to {config.duration_s:g} s after the release"
-        warnings.warn(f"fault {fault} is never met: {lasts}", WingslevelWarning, stacklevel=3)
+        warnings.warn(f"fault {fault} never happens: {lasts}", WingslevelWarning, stacklevel=3)
 
 
 def load(path: str | os.PathLike[str]) -> Flight:

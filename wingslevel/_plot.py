@@ -1,6 +1,5 @@
 """A flight as one figure of Matplotlib: attitude, errors, events, the way over the ground, and the verdict."""
 
-import io
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, INK, ORANGE
 from sim.outside.wording import plotted
 from wingslevel._errors import WingslevelError
 from wingslevel._html import number
+from wingslevel._picture import Picture
 
 if TYPE_CHECKING:
     from wingslevel._flight import Flight
@@ -24,15 +24,6 @@ Array = NDArray[np.float64]
 SIZE = (13.0, 8.6)  # inches
 MOST_EVENTS, MOST_ROWS = 24, 18  # shown
 LEVELS = {"info": FAINT, "warn": ORANGE, "error": RED}
-
-
-class Picture(Figure):
-    """A figure that a notebook shows without pyplot."""
-
-    def _repr_png_(self) -> bytes:
-        buffer = io.BytesIO()
-        self.savefig(buffer, format="png")
-        return buffer.getvalue()
 
 
 def plot(flight: "Flight") -> Picture:

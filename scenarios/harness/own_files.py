@@ -21,6 +21,7 @@ from sim.outside.blame import Refused, theirs
 PREFIX = "wingslevel"
 LIBRARIES = (".so", ".dylib", ".dll")
 _run: dict[str, ModuleType] = {}  # modules that were made here, by name
+_running: set[Path] = set()  # files whose code is being run
 
 
 class Library(NamedTuple):
@@ -77,14 +78,19 @@ def _executed(path: Path) -> ModuleType:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise Refused(f"{path.name!r} cannot be read as Python")
+    if path in _running:
+        raise Refused(f'{path.name} flies itself while it is loaded: put such calls under if __name__ == "__main__":')
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = _run[name] = module  # dataclasses and pickle look their module up by name
+    _running.add(path)
     try:
         with _cached_apart(name, apart=name != path.stem):
             spec.loader.exec_module(module)
     except BaseException:
         sys.modules.pop(name, None)
         raise
+    finally:
+        _running.discard(path)
     return module
 
 

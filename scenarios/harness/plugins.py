@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
 from estimator.instruments import Instruments, Known, property_value
+from scenarios.harness import lent
 from scenarios.harness.own_files import also_import_from, library_named, module_of_file
 from sim.outside.blame import Refused, home_of, place_of, shown, theirs
 from sim.outside.entry_points import Offer, offered
@@ -176,10 +177,13 @@ def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[s
     return of_each
 
 
-def short_name(spec: str) -> str:
+def short_name(spec: "str | Maker") -> str:
     """What reports call an estimator: the name of its class, or of its library."""
-    library = library_named(spec)
-    return library.short_name if library else spec.rpartition(":")[2]
+    library = library_named(spec) if isinstance(spec, str) else None
+    if library is not None:
+        return library.short_name
+    name, parenthesis, settings = maker_name(spec).partition("(")
+    return f"{name.rpartition(':')[2]}{parenthesis}{settings}"
 
 
 def without(of_each: Mapping[str, Mapping[str, Any]], settings: Mapping[str, Any]) -> list[str]:
@@ -415,6 +419,9 @@ def _arguments(kind: _Kind, spec: "str | Maker", maker: Any) -> set[str]:
 
 def _find(kind: _Kind, spec: str) -> Any:
     """The class (or whatever is called to make one) that `spec` names."""
+    if lent.is_lent(spec):
+        with _refusing(kind, spec):
+            return lent.find(spec)
     named = spec
     library = library_named(spec) if kind is _ESTIMATOR else None
     if library is not None:

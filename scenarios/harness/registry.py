@@ -1,11 +1,11 @@
-"""The scenarios there are: of every module of the package, of installed packages, and of anyone's own file.
+"""The registry of scenarios: those of this package, of installed packages, and of the user's own files.
 
-A module exports ``SCENARIO``, named as its file.  One that has variants exports besides ``VARIANTS``, a literal
-dictionary from the ending of each name to the line that tells of it (so that a listing need import nothing), and
-``SCENARIOS``, the first and its variants in that order.
+A module exports ``SCENARIO``, with the name of its file.  A module with variants also exports ``VARIANTS``, a literal
+dictionary from the ending of each name to a summary (literal, so that a listing need not import it), and ``SCENARIOS``,
+the scenario and its variants in that order.
 
 An installed package offers a scenario by an entry point in the group ``wingslevel.scenarios``: a module that exports
-``SCENARIO``, or a Scenario.  It is called what the entry point is called.
+``SCENARIO``, or a Scenario.  Its name is that of the entry point.
 """
 
 import importlib
@@ -39,9 +39,13 @@ def registered() -> Mapping[str, Scenario]:
 
 
 def matching(patterns: Iterable[str]) -> list[str]:
-    """Names, each once, of the scenarios that `patterns` ask for: a name, a file of one's own, or ``hand_launch*``.
+    """Names, without duplicates, of the scenarios that `patterns` select: names, files, or ``hand_launch*``.
 
-    ValueError for a pattern that nothing is called by; a plain name is taken as it is.
+    A plain name is not checked.
+
+    Raises
+    ------
+    ValueError      a pattern that matches no scenario
     """
     names: dict[str, None] = {}
     for pattern in patterns:
@@ -49,7 +53,7 @@ def matching(patterns: Iterable[str]) -> list[str]:
             found = [name for name in registered() if fnmatchcase(name, pattern)]
             found += [name for name in _offered() if fnmatchcase(name, pattern) and _can_be_loaded(name)]
             if not found:
-                raise ValueError(f"no scenario is called {pattern!r}: `wingslevel list` names all there are")
+                raise ValueError(f"no scenario matches {pattern!r}; `wingslevel list scenarios` lists all")
             names |= dict.fromkeys(found)
         else:
             names[pattern] = None
@@ -61,7 +65,7 @@ def find(name: str) -> Scenario:
 
     Raises
     ------
-    ValueError      none of that name (with the near misses), or a file that holds none
+    ValueError      no such scenario (with the near misses), or a file without one
     """
     if name.endswith(".py"):
         return _from_file(Path(name))
@@ -119,7 +123,7 @@ def _of(module: ModuleType) -> Scenario:
 
 
 def _family(module: ModuleType, where: str) -> tuple[Scenario, ...]:
-    """The scenario of a module of the package and its variants; ValueError where their names are not as told."""
+    """The scenario of a module of the package and its variants; ValueError if their names do not match."""
     first = _of(module)
     family: tuple[Scenario, ...] = getattr(module, "SCENARIOS", (first,))
     names = [where, *(f"{where}_{ending}" for ending in getattr(module, "VARIANTS", {}))]

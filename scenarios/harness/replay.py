@@ -27,7 +27,15 @@ from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.logs.validity import INTERVALS, LONGEST_S, latest
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import Equipped, PluginError, equipped, heading_reference_of, learnt, short_name
+from scenarios.harness.plugins import (
+    Equipped,
+    Maker,
+    PluginError,
+    equipped,
+    heading_reference_of,
+    learnt,
+    short_name,
+)
 from sim.events import events_of
 from sim.flight_code import FlightCodeFailed, blaming, estimate_of, record_estimates
 from sim.log import Event, Flight, Log, Outcome, Phase
@@ -106,7 +114,7 @@ class Replayed:
         }
 
 
-def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None = None) -> Equipped:
+def make(spec: str | Maker, params: Mapping[str, Any], instruments: Instruments | None = None) -> Equipped:
     """The estimator `spec`, with what is known about the instruments and with the parameters `params`.
 
     Raises
@@ -121,7 +129,7 @@ def make(spec: str, params: Mapping[str, Any], instruments: Instruments | None =
 
 def replay(
     log: RecordedLog,
-    spec: str,
+    spec: str | Maker,
     params: Mapping[str, Any] | None = None,
     window: Window | None = None,
     withheld: Sequence[str] = (),
@@ -166,7 +174,7 @@ def replay(
     )  # fmt: skip
 
 
-def gone(spec: str, failure: str) -> Replayed:
+def gone(spec: str | Maker, failure: str) -> Replayed:
     """The result for an estimator that ended the process: no rows, and the failure."""
     scores = dict.fromkeys(SCORES, math.nan)
     return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, scores, failure)

@@ -1,4 +1,4 @@
-"""The verdict: every check of every flight, the same pooled over the flights, and the exit code."""
+"""The verdict: every check of every flight, the pooled checks, and the exit code."""
 
 import math
 import re
@@ -15,7 +15,7 @@ from sim.outside.wording import json_text, markdown
 from sim.rows import markdown_table
 
 PASSED, FAILED, SIMULATION_FAILED = 0, 1, 3  # exit codes; 2 is for usage and configuration
-# Outcomes that are no result of flying: what was to be judged is not there, or only half of it.
+# Outcomes that are errors: there is no complete flight to judge.
 BROKEN = frozenset(
     (Outcome.DIVERGED, Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.TIMED_OUT, Outcome.WORKER_DIED,
      Outcome.SCENARIO_FAILED, Outcome.INTERRUPTED)
@@ -24,12 +24,12 @@ BROKEN = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class FlightVerdict:
-    """One flight judged: which it was, how it ended, its lines, and the numbers reported beside them.
+    """The verdict on one flight: which flight, its outcome, the results of its checks, and its metrics.
 
-    rows : none where nothing of it was recorded: its process died, or was stopped
+    rows : empty if nothing was recorded, because its process died or was stopped
     metrics : numbers by name, see `metrics_of`; empty where there are no rows
-    known : what the estimator was given of the instruments, or has learnt, by name
-    wall_s : how long it took; None where nobody looked.  It is no part of the result
+    known : what the estimator was given, or has learnt, about its instruments, by name
+    wall_s : wall-clock time; None if not measured.  It is ignored by ``==``
     """
 
     scenario: str
@@ -45,24 +45,24 @@ class FlightVerdict:
 
     @property
     def broken(self) -> bool:
-        """Whether it ended in an error: flight code raised, the simulation blew up, it never came back."""
+        """Whether it ended in an error: flight code raised, the simulation blew up, or the process died."""
         return self.outcome in BROKEN or not self.rows
 
     @property
     def passed(self) -> bool:
-        """Whether every check passed; False where there was none, or where it ended in an error."""
+        """Whether every check passed; False if there is none, or if the flight ended in an error."""
         return not self.broken and all(row.passed for row in self.rows)
 
     @property
     def ending(self) -> str:
-        """How it ended, in words, with the message where there is one."""
+        """The outcome in words, followed by the message if there is one."""
         words = self.outcome.replace("_", " ")
         return f"{words}: {self.message}" if self.message else words
 
 
 @dataclass(frozen=True, slots=True)
 class PooledVerdict:
-    """The flights of one scenario and estimator judged together."""
+    """The verdict on all flights of one scenario and estimator together."""
 
     scenario: str
     estimator: str
@@ -76,7 +76,7 @@ class PooledVerdict:
 
 
 def judge(scenario: Scenario, flight: Flight) -> FlightVerdict:
-    """Verdict on one flight of `scenario`."""
+    """Judge one flight of `scenario`."""
     config = flight.manifest["config"]
     known = {name: Known.from_json(entry) for name, entry in flight.manifest.get("known_to_estimator", {}).items()}
     rows = tuple(check.judge(flight) for check in scenario.checks)
@@ -116,15 +116,15 @@ def metric_name(check: str, unit: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Verdict on all flights flown."""
+    """The verdict on all flights."""
 
     flights: tuple[FlightVerdict, ...]
     pooled: tuple[PooledVerdict, ...]
-    missing: int = 0  # flights that were asked for and not finished
+    missing: int = 0  # flights that were not finished
 
     @classmethod
     def of(cls, judged: Iterable[tuple[Scenario, FlightVerdict]], missing: int = 0) -> "Verdict":
-        """Verdict from the flights of one or several scenarios and estimators, pooled over each pair of them."""
+        """The verdict on `judged` flights, pooled for each pair of scenario and estimator."""
         flights, groups = [], {}  # type: ignore[var-annotated]
         for scenario, flight in judged:
             flights.append(flight)
@@ -134,7 +134,7 @@ class Verdict:
 
     @property
     def passed(self) -> bool:
-        """Whether every flight and every pooled check passed; False where nothing was flown, or flights are missing."""
+        """Whether every flight and every pooled check passed; False if there is no flight, or flights are missing."""
         return (
             bool(self.flights)
             and not self.missing
@@ -144,18 +144,18 @@ class Verdict:
 
     @property
     def missing_text(self) -> str:
-        """How many flights are missing, in words."""
+        """The number of missing flights, in words."""
         return f"{self.missing} of {len(self.flights) + self.missing} flights are missing"
 
     @property
     def exit_code(self) -> int:
-        """0 where all passed, 3 where a simulation blew up, else 1."""
+        """0 if everything passed, 3 if a simulation blew up, else 1."""
         if any(flight.outcome == Outcome.DIVERGED for flight in self.flights):
             return SIMULATION_FAILED
         return PASSED if self.passed else FAILED
 
     def to_json(self) -> dict[str, Any]:
-        """The verdict as plain data for JSON; a value that could not be measured is None."""
+        """The verdict as plain data for JSON; None for a value that could not be measured."""
         return {
             "passed": self.passed,
             "flights": [
@@ -207,7 +207,7 @@ class Verdict:
 
 
 def _pool(scenario: Scenario, estimator: str, flights: Sequence[FlightVerdict]) -> PooledVerdict:
-    """Every check over the flights that have lines; where some have none it has not passed."""
+    """Every check over the flights that have results; it fails if some have none."""
     judged = [v for v in flights if v.rows]
     rows = [check.pool([v.rows[i] for v in judged]) for i, check in enumerate(scenario.checks)]
     if missing := len(flights) - len(judged):
@@ -223,5 +223,5 @@ def _pool(scenario: Scenario, estimator: str, flights: Sequence[FlightVerdict]) 
 
 
 def counted(n: int) -> str:
-    """So many flights, in words."""
+    """`n` flights, in words."""
     return f"{n} flight" if n == 1 else f"{n} flights"

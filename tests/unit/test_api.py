@@ -283,9 +283,16 @@ def test_listings_are_those_of_the_command(capsys: pytest.CaptureFixture[str]) -
     """The same names with the same lines."""
     run(["list", "--json", "-"])
     listed = json.loads(capsys.readouterr().out)
-    assert wl.scenarios() == listed["scenarios"]
-    assert wl.estimators() == listed["estimators"]
-    assert wl.autopilots() == listed["autopilots"]
+    for kind in ("scenarios", "estimators", "autopilots"):
+        assert getattr(wl, kind)() == {name: one["about"] for name, one in listed[kind].items()}
+
+
+def test_parameters_of_an_estimator_by_name_and_of_a_class() -> None:
+    """What `params` takes, with defaults and units."""
+    found = wl.parameters("premerlani")
+    assert found == wl.parameters(Premerlani)
+    assert (found["gps_latency_s"].unit, bool(found["k_p"].meaning)) == ("s", True)
+    assert wl.fly("crosswind", duration=1, params={name: found[name].default for name in ("k_p", "k_i")})
 
 
 def test_help_names_the_options() -> None:

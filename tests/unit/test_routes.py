@@ -77,5 +77,5 @@ def test_reached_of_a_flight_that_never_flew_is_empty():
 @pytest.mark.parametrize("route", [SQUARE[:1], (*SQUARE, Waypoint(10, 0, 60))])
 def test_reached_route_whose_waypoints_overlap_is_refused(route):
     """One waypoint alone, or two within reach of one place: counting would never end."""
-    with pytest.raises(ValueError, match=r"farther apart than 60 m"):
+    with pytest.raises(ValueError, match=r"must be more than 60 m"):
         reached(np.zeros((10, 3)), route)

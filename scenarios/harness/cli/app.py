@@ -29,6 +29,7 @@ from scenarios.harness.cli.options import (
     NamesArgument,
     NoRerunOption,
     OutOption,
+    PageOption,
     ParameterOption,
     ParamsOption,
     PictureOption,
@@ -37,6 +38,7 @@ from scenarios.harness.cli.options import (
     SeedsOption,
     SeveralOption,
     UnitOption,
+    VerdictOption,
     WebOption,
     WithholdOption,
     WorkersOption,
@@ -112,10 +114,15 @@ def _root(
 
 @app.command("list")
 def list_(kind: KindArgument = None, names: NamesArgument = None, params: ParamsOption = False,
-          json_: JsonOption = None) -> None:  # fmt: skip
+          markdown: PageOption = None, verdict: VerdictOption = None, json_: JsonOption = None) -> None:  # fmt: skip
     """Scenarios, estimators, autopilots, aircraft, sensor suites and parts, with where each one comes from."""
     from scenarios.harness.commands import listing
 
+    if markdown is not None or verdict is not None:
+        from scenarios.harness.commands import scenario_page
+
+        scenario_page.run(kind, names or [], markdown, verdict)
+        return
     listing.run(kind, names or [], params=params, json_=json_)
 
 

@@ -36,6 +36,22 @@ class _Wishes:
     """What the user wants printed."""
 
     quiet = False
+    lines: list[str] | None = None  # where lines for standard error go instead
+
+
+@contextmanager
+def collected() -> Iterator[list[str]]:
+    """Inside the block nothing is printed: gives the list of what would be written to standard error."""
+    before, _Wishes.lines = _Wishes.lines, []
+    try:
+        yield _Wishes.lines
+    finally:
+        _Wishes.lines = before
+
+
+def collecting() -> bool:
+    """Whether lines are collected, not printed."""
+    return _Wishes.lines is not None
 
 
 def be_quiet(quiet: bool = True) -> None:
@@ -97,12 +113,17 @@ def outcome(text: str) -> None:
 
 def error(message: str) -> None:
     """One line on standard error, never wrapped: ``wingslevel: message``."""
-    if sys.stderr is not None:  # None if it was closed before we started
+    if _Wishes.lines is not None:
+        _Wishes.lines.append(message)
+    elif sys.stderr is not None:  # None if it was closed before we started
         sys.stderr.write(f"wingslevel: {printable(message, _LONGEST)}\n")
 
 
 def note(line: str) -> None:
     """One dim line on standard error."""
+    if _Wishes.lines is not None:
+        _Wishes.lines.append(line)
+        return
     err().print(line, style="dim", soft_wrap=True)
 
 
@@ -166,7 +187,7 @@ def note_left_out(scenarios: Sequence[str]) -> None:
     """List the scenarios that are not flown with the user's estimator, on one line of standard error."""
     if scenarios:
         names = ", ".join(scenarios)
-        err().print(f"left out (they pass only if an estimator fails): {names}", style="dim", soft_wrap=True)
+        note(f"left out (they pass only if an estimator fails): {names}")
 
 
 def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
@@ -308,7 +329,7 @@ class Advance(Protocol):
 def progress(what: str, unit: str) -> Iterator[Advance]:
     """A progress bar on standard error while the block runs; nothing if that is not a terminal."""
     console = err()
-    if _Wishes.quiet or not console.is_terminal:
+    if _Wishes.quiet or collecting() or not console.is_terminal:
         yield lambda done, total: None  # noqa: ARG005 - the signature of Advance
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

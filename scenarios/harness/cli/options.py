@@ -125,6 +125,14 @@ LedgerOption = Annotated[
     typer.Option("--ledger", metavar="FOLDER", help="Keep each verdict there as it comes, and fly what is missing."),
 ]
 FLIGHT_TIMEOUT_S = 600.0
+PageOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Of scenarios: write the catalogue, with stories, limits, values and margins."),
+]
+VerdictOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="With --markdown: take the measured values from what check --json wrote."),
+]
 MarkdownOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Write Markdown.")]
 CalibrationOption = Annotated[
     float | None,

@@ -170,7 +170,7 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None], *, limit_
         interrupted=lambda flown: flown.verdict.outcome == Outcome.INTERRUPTED,
     )
     failed = {tasks[i].estimator for i in done if done[i].verdict.outcome in FLIGHT_CODE_FAILED}
-    costs = _costs(plan, failed, limit_s) if len(done) == len(tasks) else {}
+    costs = _costs(plan, failed, min(workers, 1), limit_s) if len(done) == len(tasks) else {}
     entrants = []
     for name in plan.names:
         flights = tuple(done[i] for i in sorted(done) if tasks[i].estimator == name)
@@ -217,13 +217,14 @@ def _measured(scenario: str, config: str) -> tuple[NDArray[Any], Instruments]:
     return prepared.fly().log.measured, prepared.instruments
 
 
-def _costs(plan: Plan, failed: Container[str], limit_s: float | None) -> dict[str, Cost]:
+def _costs(plan: Plan, failed: Container[str], workers: int, limit_s: float | None) -> dict[str, Cost]:
     """What an update of each that did not fail costs, over the measurements of the first seconds of a flight."""
     another = {"duration_s": TIMED_S, "estimator": "premerlani", "estimator_params": {}}
     config = plan.config.model_copy(update=another).model_dump_json()
     # The oracle answers in a flight alone.
     timed = [name for name in plan.names if name not in failed and name != "oracle"]
-    found = fly_each([_Timing(plan.named, config, name) for name in timed], 1, lambda _n, _total: None, limit_s=limit_s)
+    tasks = [_Timing(plan.named, config, name) for name in timed]
+    found = fly_each(tasks, workers, lambda _n, _total: None, limit_s=limit_s)
     return {timed[i]: measured for i, measured in found.items()}
 
 

@@ -47,6 +47,13 @@ MANY = 8  # more lines than these are drawn thin, smoother and without shades
 
 def draw(comparison: Comparison, path: Path) -> None:
     """Draw `comparison` into `path`; its ending says the format.  ValueError if nothing was flown."""
+    figure = figure_of(comparison)
+    with matplotlib.rc_context(STYLE):  # some parts of a figure are made as it is written
+        write_figure(path, figure, DPI)
+
+
+def figure_of(comparison: Comparison, kind: type[Figure] = Figure) -> Figure:
+    """`comparison` as a figure of the class `kind`; ValueError if nothing was flown."""
     flown = [e for e in comparison.entrants if e.flights]
     if not flown:
         raise ValueError("nothing was flown: there is nothing to draw")
@@ -54,7 +61,7 @@ def draw(comparison: Comparison, path: Path) -> None:
     table = 0.36 * len(flown) + 0.3  # inches
     height = 1.35 + 4.3 + 1.1 + table + 0.7
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, height), facecolor="white")
+        figure = kind(figsize=(WIDTH, height), facecolor="white")
         FigureCanvasAgg(figure)
         edges = {"left": 0.055, "right": 0.975, "top": 1.0 - 1.35 / height, "bottom": 0.62 / height}
         rows = figure.add_gridspec(2, 1, height_ratios=(4.3, table), hspace=2 * 1.1 / (4.3 + table), **edges)
@@ -68,7 +75,7 @@ def draw(comparison: Comparison, path: Path) -> None:
         _strips(inclination, flown, colours, "inclination")
         _strips(heading, flown, colours, "heading")
         _costs(cost, flown, colours)
-        write_figure(path, figure, DPI)
+    return figure
 
 
 def _heading(figure: Any, comparison: Comparison, height: float) -> None:

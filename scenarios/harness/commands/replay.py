@@ -17,6 +17,7 @@ from scenarios.harness.plugins import shared_settings, short_name, without
 from scenarios.harness.recorder import record
 from scenarios.harness.replay import Replayed, Window, as_flight, gone, judged_rows, known_to, make, replay, why_none
 from sim import recording
+from sim.log import Flight
 from sim.outside.wording import file_name
 
 _HEADINGS = ("", "inclination\n   RMS    p95    max", "heading\nRMS", "rotation\n   RMS    max", "ns per\nupdate")
@@ -31,7 +32,8 @@ _SHOWN = (
 class Replays:
     """A log and its replays by the estimators.
 
-    folders : recordings by estimator, None for one that could not be written
+    folders : recordings by estimator, None for one that was not, or could not be, written
+    flights : each replay as a flight, by estimator; none for one that ended its process
     not_judged : why nothing was judged, empty if something was
     notes : parameters that only some of the estimators have, and the like, a line each
     """
@@ -40,6 +42,7 @@ class Replays:
     judged_s: float
     replays: tuple[Replayed, ...]
     folders: Mapping[str, Path | None]
+    flights: Mapping[str, Flight]
     not_judged: str = ""
     notes: tuple[str, ...] = ()
 
@@ -74,7 +77,7 @@ class Replays:
 def replay_log(
     path: Path,
     names: Sequence[str],
-    into: Path,
+    into: Path | None,
     *,
     reference: Path | None = None,
     columns: str | None = None,
@@ -86,6 +89,7 @@ def replay_log(
 ) -> Replays:
     """Read the log at `path`, replay it with each estimator of `names`, record each below the folder `into`.
 
+    into : None records nothing
     params : for all estimators that have them, or, as ``premerlani.gps_latency_s``, for one
     withheld : properties of the instruments to hide from the estimators; ``all`` hides all of them
 
@@ -100,12 +104,12 @@ def replay_log(
     of_each, withheld = shared_settings(names, settings), property_names(withheld)
     for name in names:
         make(name, of_each[name])
-    recording.check_writable(into)
+    if into is not None:
+        recording.check_writable(into)
     log = logs.read(path, reference=reference, columns=columns, imu=imu)
     for name in names:  # all are made with the properties of the log before any is run
         make(name, of_each[name], known_to(log, withheld))
     replays: list[Replayed] = []
-    folders: dict[str, Path | None] = {}
     for name in names:
         watched = f"estimator {name}"
         if watched in guard.lost:  # it ended the process
@@ -113,20 +117,20 @@ def replay_log(
             continue
         with console.progress(f"replaying {name}", "") as advance, guard.watched(watched):
             replays.append(replay(log, name, of_each[name], window, withheld, advance))
-    stem = log.name.partition(".")[0]
-    for replayed in replays:
-        if not len(replayed.log):
-            folders[replayed.estimator] = None
-            continue
-        flight = as_flight(log, replayed, window)
-        with console.progress(f"recording {replayed.estimator}", "") as _:
-            name = f"replay_{file_name(stem)}-{file_name(replayed.estimator)}"
-            folder = record(flight, into, name, rerun=rerun)
-        folders[replayed.estimator] = folder
+    flights = {replayed.estimator: as_flight(log, replayed, window) for replayed in replays if len(replayed.log)}
+    folders = {r.estimator: _recorded(flights.get(r.estimator), log, r.estimator, into, rerun) for r in replays}
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
     notes = (*without(of_each, settings), *_ground_too(log))
-    return Replays(log, judged_s, tuple(replays), folders, why_none(log, window, first), notes)
+    return Replays(log, judged_s, tuple(replays), folders, flights, why_none(log, window, first), notes)
+
+
+def _recorded(flight: Flight | None, log: RecordedLog, name: str, into: Path | None, rerun: bool) -> Path | None:
+    """Where `flight`, the replay of `log` by the estimator `name`, was recorded; None where it was not."""
+    if flight is None or into is None:
+        return None
+    with console.progress(f"recording {name}", "") as _:
+        return record(flight, into, f"replay_{file_name(log.name.partition('.')[0])}-{file_name(name)}", rerun=rerun)
 
 
 def _place(folder: Path | None) -> str | None:

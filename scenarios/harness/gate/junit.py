@@ -1,8 +1,8 @@
-"""The verdict as JUnit XML, as Jenkins, GitLab and others read it: suites, cases, failures, errors, times.
+"""The verdict as JUnit XML for Jenkins, GitLab and others: suites, cases, failures, errors, times.
 
-A suite is a scenario flown with an estimator.  A flight that came to an end in flying has a case for each check; one
-that ended in an error (flight code raised, the simulation blew up, it took too long, its process died) has one case,
-with one error.  The time of a flight is that of its first case, so that the times of the cases add up to the suite's.
+A suite is a scenario flown with an estimator.  A flight has a case for each check; a flight that ended in an error
+(flight code raised, the simulation blew up, it took too long, its process died) has one case with one error.  The first
+case of a flight carries its time, so that the times of the cases add up to that of the suite.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from sim.outside.wording import printable
 
 @dataclass(frozen=True, slots=True)
 class _Case:
-    """One case; `kind` and `type` say how it went wrong, where it did."""
+    """One case; `kind` and `type` are those of its failure or error, if any."""
 
     name: str
     time_s: float = 0.0
@@ -27,7 +27,7 @@ class _Case:
 
 
 def junit(verdict: Verdict) -> str:
-    """The whole of `verdict` as the text of an XML file."""
+    """`verdict` as the text of an XML file."""
     root, everything = ElementTree.Element("testsuites", name="wingslevel"), []
     for pool in verdict.pooled:
         flights = verdict.flights_of(pool)
@@ -57,7 +57,7 @@ def _of_flight(v: FlightVerdict) -> Iterator[_Case]:
 
 
 def _of_pool(pool: PooledVerdict, n_broken: int) -> Iterator[_Case]:
-    """The pooled checks; with a flight that ended in an error none of them can fail besides: it is skipped."""
+    """The pooled checks; if a flight ended in an error, those that fail are skipped: the error is reported already."""
     for row in pool.rows:
         case = _of_row(row, "[pooled]")
         if case.kind and n_broken:

@@ -16,17 +16,18 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from types import FrameType
+from types import FrameType, ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
 from estimator.compiler import compiling
+from scenarios.harness import lent
 from scenarios.harness.cli import console
 from scenarios.harness.gate.guard import GRACE_S
 from scenarios.harness.plugins import PluginError
 from sim.log import Outcome
 from sim.outside.blame import show_tracebacks, tracebacks_shown
 from sim.outside.processes import end_with_parent
-from sim.outside.signals import Interrupted, TimedOut, limited, on_extended
+from sim.outside.signals import Interrupted, TimedOut, limited, listening, on_extended
 from sim.outside.wording import described
 
 LIVES = 2  # processes that a task may cost before it is lost
@@ -59,14 +60,18 @@ def fly_each(
 
     Parameters
     ----------
+    workers         processes; 0 flies one after the other in this process, which flight code may then end
     limit_s         wall-clock limit of each task; None is no limit
     interrupted     whether a result is that of a task that was interrupted: it ends the rest
     keep            is handed each result as it comes, with the number of its task
     advance         is called with the number done and the total
     """
+    if _Worker.inside:
+        raise ValueError('a worker process cannot start others: put such calls under if __name__ == "__main__":')
+    results = _results(tasks, min(workers, len(tasks)), limit_s) if workers else _here(tasks, limit_s)
     done: dict[int, _Result] = {}
     with contextlib.suppress(KeyboardInterrupt):  # finished tasks count; the caller sees that some are missing
-        for i, result in _results(tasks, max(1, min(workers, len(tasks))), limit_s):
+        for i, result in results:
             if interrupted(result):
                 break
             keep(i, result)
@@ -80,10 +85,19 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def _here(tasks: Sequence[Flyable[_Result]], limit_s: float | None) -> Iterator[tuple[int, _Result]]:
+    """Number and result of each task, in this process."""
+    for i, task in enumerate(tasks):
+        with listening():
+            result = _fly(task, limit_s)
+        yield i, result
+
+
 def _results(tasks: Sequence[Flyable[_Result]], workers: int, limit_s: float | None) -> Iterator[tuple[int, _Result]]:
     """Number and result of each task, as they come."""
     waiting, lives = deque(range(len(tasks))), [LIVES] * len(tasks)
-    announced = multiprocessing.get_context("spawn").Value("b", compiling.compiled() > 0, lock=False)
+    silent = compiling.compiled() > 0 or console.collecting()
+    announced = multiprocessing.get_context("spawn").Value("b", silent, lock=False)
     crew: list[_Worker[_Result]] = [_Worker(limit_s, announced) for _ in range(workers)]
     try:
         while waiting or any(worker.busy for worker in crew):
@@ -131,7 +145,12 @@ class _Told(Generic[_Result]):
 
 
 class _Worker(Generic[_Result]):
-    """One process, restarted when it dies, and its current task."""
+    """One process, restarted when it dies, and its current task.
+
+    inside : whether this process is one
+    """
+
+    inside = False
 
     def __init__(self, limit_s: float | None, told: Any) -> None:
         self.number = -1  # of the task
@@ -162,9 +181,9 @@ class _Worker(Generic[_Result]):
         context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
         # Without locks: a process killed while holding one would block the others.
         self._extended_s = context.Value("d", 0.0, lock=False)
-        arguments = os.getpid(), self._extended_s, self._told, tracebacks_shown()
+        arguments = os.getpid(), self._extended_s, self._told, tracebacks_shown(), lent.packed()
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_set_up, initargs=arguments)
-        with _held_back():
+        with _held_back(), _without_main():
             self.future = self._pool.submit(os.getpid)
         self._process = next(iter(set(multiprocessing.active_children()) - others), None)
 
@@ -237,6 +256,16 @@ def _held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
+@contextlib.contextmanager
+def _without_main() -> Iterator[None]:
+    """Start a process inside the block that does not run the user's script again, which may fly as it is imported."""
+    main, sys.modules["__main__"] = sys.modules["__main__"], ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
+
+
 def _how(exitcode: int | None) -> str:
     """How a process ended."""
     if exitcode is not None and exitcode < 0:
@@ -244,9 +273,11 @@ def _how(exitcode: int | None) -> str:
     return "ended by itself" + ("" if exitcode is None else f" (exit code {exitcode})")
 
 
-def _set_up(parent: int, extended_s: Any, told: Any, tracebacks: bool) -> None:
+def _set_up(parent: int, extended_s: Any, told: Any, tracebacks: bool, makers: dict[str, bytes]) -> None:
     """In a new process."""
+    _Worker.inside = True
     end_with_parent(parent)
+    lent.receive(makers)
     show_tracebacks(tracebacks)
 
     def extend(seconds: float) -> None:

@@ -1,6 +1,6 @@
-"""Manoeuvres found in the truth of a flight: turns with their roll-outs, loops, rolls, vertical flight, spins.
+"""Manoeuvres found in the true motion: turns with their roll-outs, loops, rolls, vertical flight, spins.
 
-What a manoeuvre is judged by must not depend on what the estimator believed or on what the script asked for.
+How a manoeuvre is judged must not depend on the estimate or on the script.
 """
 
 import math
@@ -37,14 +37,14 @@ def bank_rad(flight: Flight) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class RollOut:
-    """The end of a turn: when the bank fell below 10 degrees, and when the next turn (or the end) began."""
+    """The end of a turn: when the bank fell below 10 degrees, and when the next turn began or the flight ended."""
 
     t_s: float
     until_s: float
 
 
 def roll_outs(flight: Flight, steep_deg: float = 25.0, level_deg: float = 10.0, held_s: float = 1.0) -> list[RollOut]:
-    """Roll-outs of the turns truly flown, in order of time.
+    """Roll-outs of the true turns, in order of time.
 
     A turn is a bank above `steep_deg` to one side for at least `held_s`; it begins where the bank last rose
     through `level_deg` before that, and ends where the bank next falls below it.
@@ -81,7 +81,7 @@ def while_banked(series: SeriesOf, steeper_deg: float) -> SeriesOf:
 
 
 def time_banked_s(steeper_deg: float, from_: Moment) -> Metric:
-    """Metric: for how long in all, from `from_` on, the true bank was at least `steeper_deg` to either side, s."""
+    """Metric: total time, from `from_` on, with a true bank of at least `steeper_deg` to either side, s."""
     steep = while_banked(bank_size_deg, steeper_deg)
     return lambda flight: Measured(len(steep(flight).within(from_(flight), math.inf).judged_values) * flight.dt_s)
 
@@ -104,8 +104,7 @@ def slowest_recovery(series: SeriesOf, limit: float, turns: int, within_s: float
 def turns_of_pitch(flight: Flight) -> Array:
     """Turns of the nose in the vertical plane it flew in at the release: 1 after an inside loop, shape (n,).
 
-    The angle of the nose is taken in the plane of the vertical and the initial heading, so that a roll in between
-    counts nothing.
+    The angle of the nose is taken in the plane of the vertical and the initial heading, so that rolls do not count.
     """
     nose = flight.log.truth["R_eb"][:, :, 0]
     k0 = int(np.searchsorted(time_s(flight), 0.0))
@@ -117,12 +116,12 @@ def turns_of_pitch(flight: Flight) -> Array:
 
 
 def turns_that_count(loops: int) -> float:
-    """Turns of the nose that count as `loops` whole ones: the last may end 20 degrees short of level."""
+    """Turns of the nose that count as `loops` full loops: the last may end 20 degrees short of level."""
     return loops - 20.0 / 360.0
 
 
 def loops_end_s(loops: int) -> Moment:
-    """The moment at which the nose has come round `loops` times: the pull is over."""
+    """The moment at which the nose has come round `loops` times."""
 
     def moment(flight: Flight) -> float:
         done = np.flatnonzero(turns_of_pitch(flight) >= turns_that_count(loops))
@@ -132,19 +131,19 @@ def loops_end_s(loops: int) -> Moment:
 
 
 def most_loops(flight: Flight) -> Measured:
-    """Metric: how often the nose came round, turns."""
+    """Metric: most turns of the nose in inside loops."""
     return Measured(highest(turns_of_pitch(flight)))
 
 
 def most_outside_loops(flight: Flight) -> Measured:
-    """Metric: how often the nose came round the other way, turns."""
+    """Metric: most turns of the nose in outside loops."""
     return Measured(-lowest(turns_of_pitch(flight)))
 
 
 def turned(axis: str, sense: float) -> Metric:
-    """Metric: the most that it turned about its own `axis`, x, y or z, in the sense +1 or -1, turns.
+    """Metric: largest rotation about the body `axis`, x, y or z, in the sense +1 or -1, turns.
 
-    The integral of the body rate, from its lowest point to the highest that follows: what was turned back counts off.
+    The integral of the body rate, from its lowest point to the highest that follows; turning back is subtracted.
     """
     i = "xyz".index(axis)
 
@@ -158,7 +157,7 @@ def turned(axis: str, sense: float) -> Metric:
 
 
 def inverted(flight: Flight) -> NDArray[np.bool_]:
-    """Flags: upside down, ``r_zz`` below -0.8, within 37 degrees of it."""
+    """Flags: upside down within 37 degrees, ``r_zz`` below -0.8."""
     return np.asarray(flight.log.truth["R_eb"][:, 2, 2] < -0.8)
 
 
@@ -168,7 +167,7 @@ def vertical(flight: Flight) -> NDArray[np.bool_]:
 
 
 def spinning(flight: Flight) -> NDArray[np.bool_]:
-    """Flags: the wing well stalled, and roll and yaw of one sense, each faster than 45 deg/s: autorotation."""
+    """Flags: wing well stalled, roll and yaw in the same sense, each faster than 45 deg/s: autorotation."""
     truth, least_rad_s = flight.log.truth, math.radians(45.0)
     roll, yaw = truth["imu_omega_b_rad_s"][:, 0], truth["imu_omega_b_rad_s"][:, 2]
     fast = (np.minimum(np.abs(roll), np.abs(yaw)) > least_rad_s) & (roll * yaw > 0.0)
@@ -176,17 +175,17 @@ def spinning(flight: Flight) -> NDArray[np.bool_]:
 
 
 def total_s(flags: Flags) -> Metric:
-    """Metric: how long `flags` were true, s."""
+    """Metric: total time for which `flags` are true, s."""
     return lambda flight: Measured(float(np.count_nonzero(flags(flight))) * flight.dt_s)
 
 
 def longest_s(flags: Flags) -> Metric:
-    """Metric: how long `flags` were true without a break, at most, s."""
+    """Metric: longest time for which `flags` are true without a break, s."""
     return lambda flight: Measured(max((b - a + 1 for a, b in _runs(flags(flight))), default=0) * flight.dt_s)
 
 
 def last(flags: Flags) -> Moment:
-    """The last moment at which `flags` were true; NaN where they never were."""
+    """The last moment at which `flags` are true; NaN if they never are."""
 
     def moment(flight: Flight) -> float:
         true = np.flatnonzero(flags(flight))
@@ -203,7 +202,7 @@ def spun_turns(flight: Flight) -> Measured:
 
 
 def course_turned(flags: Flags) -> Metric:
-    """Metric: how far the true course over the ground turned to the right between the first and last flag, turns."""
+    """Metric: how far the true course turned to the right between the first and the last flag, turns."""
 
     def metric(flight: Flight) -> Measured:
         true = np.flatnonzero(flags(flight))

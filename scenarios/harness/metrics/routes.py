@@ -1,8 +1,8 @@
-"""How a route of waypoints was flown, read from the truth alone: what was reached, and how far off the legs.
+"""How a route of waypoints was flown, from the true motion: waypoints reached, and distance from the legs.
 
-A waypoint is reached where the aeroplane, having reached those before it, first comes within so many metres of it,
-over the ground.  Off the legs is off the nearer of two: the one that leads to the waypoint due, and the one before
-it, whose corner is still being rounded.
+A waypoint is reached when the aeroplane, having reached those before it, first comes horizontally near it.
+The distance from the legs is the distance from the nearer of two: the leg to the next waypoint and the one before it,
+because a corner is rounded.
 """
 
 import math
@@ -20,15 +20,17 @@ REACHED_M = 30.0
 
 
 def reached(p_e_m: Array, route: Sequence[Waypoint], near_m: float = REACHED_M) -> NDArray[np.int64]:
-    """How many waypoints, counted on round after round, had been reached at each tick, shape (n,).
+    """Number of waypoints reached up to each tick, counted on from round to round, shape (n,).
 
-    ValueError where one place is near two waypoints in turn: they would be reached without flying.
+    Raises
+    ------
+    ValueError      two consecutive waypoints are so close that both are reached at one place
     """
     for w, then in zip(route, (*route[1:], *route[:1]), strict=True):
         apart_m = math.hypot(then.north_m - w.north_m, then.east_m - w.east_m)
         if apart_m <= 2.0 * near_m:
             apart = f"{tuple(w)} and {tuple(then)} m, {apart_m:g} m apart"
-            raise ValueError(f"route: {apart}, must be farther apart than {2.0 * near_m:g} m")
+            raise ValueError(f"route: {apart}, must be more than {2.0 * near_m:g} m")
     counts, k = np.zeros(len(p_e_m), np.int64), 0
     distances = [np.hypot(p_e_m[:, 0] - w.north_m, p_e_m[:, 1] - w.east_m) for w in route]
     while route:
@@ -42,7 +44,7 @@ def reached(p_e_m: Array, route: Sequence[Waypoint], near_m: float = REACHED_M) 
 
 
 def _off_leg(p_e_m: Array, begin: Array, end: Array) -> tuple[Array, Array]:
-    """Distance to a leg over the ground, and height missing to the straight line along it; each of shape (n,)."""
+    """Horizontal distance to a leg, and height missing to the straight line along it, m; each of shape (n,)."""
     way = end[:, :2] - begin[:, :2]
     length = np.maximum(np.sum(way**2, axis=1), 1e-9)
     share = np.clip(np.sum((p_e_m[:, :2] - begin[:, :2]) * way, axis=1) / length, 0.0, 1.0)
@@ -51,7 +53,7 @@ def _off_leg(p_e_m: Array, begin: Array, end: Array) -> tuple[Array, Array]:
 
 
 def _off_route(flight: Flight, route: Sequence[Waypoint]) -> tuple[Array, Array]:
-    """Cross-track distance and height missing, m, by the nearer leg, shape (n,)."""
+    """Cross-track distance and height missing at the nearer leg, m, each of shape (n,)."""
     p_e_m, points = flight.log.truth["p_e_m"], np.array(route, np.float64)
     due = reached(p_e_m, route)
     ends = [points[(due + i) % len(route)] for i in (-2, -1, 0)]
@@ -60,17 +62,17 @@ def _off_route(flight: Flight, route: Sequence[Waypoint]) -> tuple[Array, Array]
 
 
 def off_route_m(route: Sequence[Waypoint]) -> SeriesOf:
-    """Distance over the ground from the legs of `route`, m."""
+    """Horizontal distance from the legs of `route`, m."""
     return lambda flight: _judged(flight, _off_route(flight, route)[0])
 
 
 def height_missing_m(route: Sequence[Waypoint]) -> SeriesOf:
-    """Height above the aeroplane of the straight line from waypoint to waypoint, m."""
+    """Height of the straight line between waypoints above the aeroplane, m."""
     return lambda flight: _judged(flight, _off_route(flight, route)[1])
 
 
 def waypoints_reached(route: Sequence[Waypoint], near_m: float = REACHED_M) -> Metric:
-    """Metric: how many waypoints were reached in their order."""
+    """Metric: number of waypoints reached, in their order."""
 
     def metric(flight: Flight) -> Measured:
         counts = reached(flight.log.truth["p_e_m"], route, near_m)

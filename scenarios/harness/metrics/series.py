@@ -1,12 +1,12 @@
-"""The numbers judged: attitude errors against the truth, and what the flight itself did.
+"""Series and metrics: attitude errors against the truth, and the motion of the aeroplane itself.
 
-A series has a value per tick, a flag that says where it may be judged, and times that count from the release.
-A metric turns a flight into one value with the number of samples it rests on and the number that a whole window
-holds; a flight that ended early, or a window in which nothing could be judged, shows in those two numbers.
+A series has a value per tick, a flag that says where it is judged, and times relative to the release.  A metric
+reduces a flight to one value, with the number of samples used and the number expected of a whole window.  A flight that
+ended early, or a window in which nothing was judged, has fewer samples than expected.
 
-Attitude error is the angle of ``R_est @ R_true.T``, beside it its two parts: inclination, the angle between the
-two ``r_z`` rows, and heading, ``atan2(r_yx, r_xx)``.  Heading means nothing near the vertical, nor in the air standing
-still, and is judged where ``|r_zx| < 0.9`` and the ground speed is above 3 m/s; that of a nose on a table, too.
+The attitude error is the angle of ``R_est @ R_true.T``.  Its two parts are the inclination error, the angle between the
+two ``r_z`` rows, and the heading error, of ``atan2(r_yx, r_xx)``.  Heading is undefined near the vertical, and the
+course at low speed: it is judged where ``|r_zx| < 0.9`` and the ground speed exceeds 3 m/s, or at rest on a table.
 """
 
 import math
@@ -29,7 +29,7 @@ _ROUND_OFF_S = 1e-6  # of times; ticks lie at least milliseconds apart
 
 
 class Measured(NamedTuple):
-    """One value of a flight, and how much of what it should rest on was there."""
+    """One value of a flight, with the number of samples it rests on and the number expected."""
 
     value: float
     samples: int = 1
@@ -37,31 +37,31 @@ class Measured(NamedTuple):
 
     @property
     def complete(self) -> bool:
-        """Whether the flight held at least the expected number of samples."""
+        """Whether there were at least as many samples as expected."""
         return self.samples >= self.expected > 0
 
 
 NOTHING = Measured(math.nan, 0, 1)
 Metric = Callable[[Flight], Measured]
-Moment = Callable[[Flight], float]  # a time since the release, NaN where it never came
+Moment = Callable[[Flight], float]  # seconds after the release, NaN if it never came
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A value per tick: times since the release, values, and where they may be judged; each of shape (n,)."""
+    """A value per tick: times after the release, values, and where they are judged; each of shape (n,)."""
 
     t_s: Array
     value: Array
     judged: NDArray[np.bool_]
 
     def within(self, from_s: float, to_s: float) -> "Series":
-        """The ticks that end after `from_s` and not after `to_s`."""
+        """The ticks that end later than `from_s` and no later than `to_s`."""
         inside = _inside(self.t_s, from_s, to_s)
         return Series(self.t_s[inside], self.value[inside], self.judged[inside])
 
     @property
     def judged_values(self) -> Array:
-        """The values that may be judged, shape (m,)."""
+        """The values that are judged, shape (m,)."""
         return self.value[self.judged]
 
 
@@ -73,12 +73,12 @@ def _inside(t_s: Array, from_s: float, to_s: float) -> NDArray[np.bool_]:
 
 
 def time_s(flight: Flight) -> Array:
-    """Times of the ticks since the release, shape (n,)."""
+    """Times of the ticks after the release, s, shape (n,)."""
     return flight.log.truth["t_s"] - flight.release_s
 
 
 def planned_end_s(flight: Flight) -> float:
-    """Time since the release at which the flight was planned to end, by its manifest."""
+    """Planned end of the flight, s after the release, from its manifest."""
     return float(flight.manifest["config"]["duration_s"])
 
 
@@ -89,7 +89,7 @@ def _series(flight: Flight, value: Array, judged: NDArray[np.bool_] | None = Non
 
 
 def inclination_error_deg(flight: Flight) -> Series:
-    """Angle between the estimated and the true ``r_z`` row: which way is down, degrees."""
+    """Angle between the estimated and the true vertical (the ``r_z`` rows), degrees."""
     log = flight.log
     return _series(flight, np.degrees(inclination_error_rad(log.flown["R_eb"], log.truth["R_eb"])))
 
@@ -101,9 +101,9 @@ def attitude_error_deg(flight: Flight) -> Series:
 
 
 def heading_error_deg(against: HeadingReference | None = None) -> SeriesOf:
-    """Size of the heading error, degrees, against the true nose or the true course over ground (without any lag).
+    """Size of the heading error, degrees, relative to the true nose or the true course over ground (without lag).
 
-    None is what the flight's estimator says its heading converges to.
+    None: relative to the heading reference of the flight's estimator.
     """
 
     def series(flight: Flight) -> Series:
@@ -147,7 +147,7 @@ def rate_error_deg_s(axis: str) -> SeriesOf:
 
 
 def wind_error_m_s(flight: Flight) -> Series:
-    """Error of the estimated horizontal wind against the flight's mean true wind, m/s; judged where there is one."""
+    """Error of the estimated horizontal wind against the flight's mean true wind, m/s; judged where it is estimated."""
     mean = flight.log.truth["wind_e_m_s"][:, :2].mean(axis=0)
     value = np.linalg.norm(flight.log.flown["wind_e_m_s"][:, :2] - mean, axis=1)
     return _series(flight, value, np.isfinite(value))
@@ -201,7 +201,7 @@ def end(flight: Flight) -> float:
 
 
 def last(flight: Flight) -> float:
-    """The last tick that was flown, planned or not."""
+    """The last tick flown, planned or not."""
     return float(time_s(flight)[-1]) if len(flight.log) else math.nan
 
 
@@ -216,27 +216,27 @@ def after(moment: Moment, delay_s: float) -> Moment:
 
 
 def rms(values: Array) -> float:
-    """Root of the mean square; NaN where there is nothing."""
+    """Root of the mean square; NaN if there are no values."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
 
 
 def mean_size(values: Array) -> float:
-    """Size of the mean: what is left once noise has averaged out; NaN where there is nothing."""
+    """Size of the mean, in which noise averages out; NaN if there are no values."""
     return float(abs(np.mean(values))) if len(values) else math.nan
 
 
 def p95(values: Array) -> float:
-    """95th percentile; NaN where there is nothing."""
+    """95th percentile; NaN if there are no values."""
     return float(np.percentile(values, 95.0)) if len(values) else math.nan
 
 
 def highest(values: Array) -> float:
-    """The largest; NaN where there is nothing."""
+    """The largest value; NaN if there are none."""
     return float(np.max(values)) if len(values) else math.nan
 
 
 def lowest(values: Array) -> float:
-    """The smallest; NaN where there is nothing."""
+    """The smallest value; NaN if there are none."""
     return float(np.min(values)) if len(values) else math.nan
 
 
@@ -248,14 +248,14 @@ def over(
     *,
     judged_share: float = 1.0,
 ) -> Metric:
-    """Metric that reduces what may be judged of `series` between two moments.
+    """Metric: the judged values of `series` between two moments, reduced to one.
 
-    judged_share : the part of a whole window's ticks that must have been judged, 0..1
+    judged_share : the fraction of the window's ticks that must be judged, 0..1
     """
 
     def metric(flight: Flight) -> Measured:
         from_s, to_s = from_(flight), to(flight)
-        if not to_s > from_s:  # also where a moment never came
+        if not to_s > from_s:  # or one of them is NaN
             return NOTHING
         values = series(flight).within(from_s, to_s).judged_values
         whole = math.floor((to_s - from_s) / flight.dt_s + 1e-6) - 1  # a tick may straddle either end
@@ -265,9 +265,9 @@ def over(
 
 
 def settled_after_s(series: Series, limit: float) -> float:
-    """Time from the start of `series` until the value stays at or below `limit`; NaN where it never does.
+    """Time from the start of `series` until the value stays at or below `limit`; NaN if it never does.
 
-    Ticks that may not be judged count as above the limit.
+    Ticks that are not judged count as above the limit.
     """
     if len(series.t_s) == 0:
         return math.nan
@@ -293,17 +293,17 @@ def settling(series: SeriesOf, limit: float, from_: Moment = start, to: Moment =
 
 
 def survived(flight: Flight) -> Measured:
-    """Metric: 1 where the flight lasted as long as planned, 0 where it ended in any other way."""
+    """Metric: 1 if the flight lasted as long as planned, else 0."""
     return Measured(float(flight.outcome == Outcome.COMPLETED))
 
 
 def ground_contact_s(flight: Flight) -> Measured:
-    """Metric: when it hit the ground, s after the release; nothing where it did not."""
+    """Metric: when it hit the ground, s after the release; not measured if it did not."""
     return Measured(last(flight)) if flight.outcome == Outcome.GROUND_CONTACT else NOTHING
 
 
 def pitch_at_ground_deg(flight: Flight) -> Measured:
-    """Metric: true pitch as it hit the ground, degrees; nothing where it did not."""
+    """Metric: true pitch when it hit the ground, degrees; not measured if it did not."""
     if flight.outcome != Outcome.GROUND_CONTACT or not len(flight.log):
         return NOTHING
     return Measured(float(_pitch_deg(flight.log.truth["R_eb"])[-1]))
@@ -335,7 +335,7 @@ def nearest_m(from_s: float, to_s: float) -> Metric:
 
 
 def pass_time_s(radius_m: float) -> Metric:
-    """Metric: when the launch point was first passed within `radius_m`, s after the release; NaN where never."""
+    """Metric: when the launch point was first passed within `radius_m`, s after the release; NaN if never."""
 
     def metric(flight: Flight) -> Measured:
         distance = launch_distance_m(flight)
@@ -346,14 +346,14 @@ def pass_time_s(radius_m: float) -> Metric:
 
 
 def time_in_mode_s(mode: Mode) -> Metric:
-    """Metric: for how long `mode` was in force after the release, by the autopilot's own word, s."""
+    """Metric: how long `mode` was in force after the release, as the autopilot reports it, s."""
     return lambda flight: Measured(flight.dt_s * int(np.sum((flight.log.flown["mode"] == mode) & (time_s(flight) > 0))))
 
 
 def summary(flight: Flight) -> dict[str, float | None]:
-    """Metrics of any flight, over all of it from the release on, with units in their names; None: not measurable.
+    """The general metrics of a flight, from the release to its end, by name with unit; None if not measurable.
 
-    ``heading_rms_deg`` is against what the flight's estimator says its heading converges to, the nose or the course.
+    ``heading_rms_deg`` is relative to the heading reference of the flight's estimator, the nose or the course.
     """
     incline, geodesic = inclination_error_deg(flight), attitude_error_deg(flight)
     course, nose = heading_error_deg("course")(flight), heading_error_deg("nose")(flight)
