@@ -2,7 +2,7 @@
 
     @pytest.mark.flight("crosswind", estimator=MyFilter, seeds=range(3))
     def test_crosswind(flown, within):
-        within(flown, inclination_rms_deg=4.0, heading_rms_deg=5.0)
+        within(flown, inclination_rms_deg=4.0)
 
 pytest imports this module in every run: it imports nothing heavy until a test flies.
 """
