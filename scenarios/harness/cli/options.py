@@ -36,7 +36,9 @@ EstimatorOption = Annotated[
 ]  # fmt: skip
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for example gps.latency_s=0.5."),
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="Any other parameter, for example gps.latency_s=0.5 or my_filter.k_p=1."
+    ),
 ]
 WindOption = Annotated[
     str | None,
@@ -172,7 +174,8 @@ SeveralOption = Annotated[
     ),
 ]  # fmt: skip
 ParameterOption = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter: k_p=1, or my_filter.k_p=1."),
 ]
 LogEstimatorsOption = Annotated[
     str,
