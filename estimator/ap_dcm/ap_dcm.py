@@ -179,7 +179,7 @@ def end_of_interval(row, s):  # type: ignore[no-untyped-def]
     else:
         if s.interval_s < NO_GPS_S:
             return False
-        for i in range(3):  # how the nose turns is what remains to tell of the motion
+        for i in range(3):  # only the turn of the nose shows the motion then
             v[i] = s.R_eb[i, 0] * s.airspeed_m_s + wind[i]
         s.lock = 0
     if s.begun:

@@ -27,7 +27,7 @@ class Progress:
 
 
 Watch = Callable[[Progress], None]
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 def _to_stderr(trouble: str) -> None:
@@ -38,10 +38,10 @@ class _State:
     """State of this process."""
 
     watch: Watch | None = None
-    tell: Tell = staticmethod(_to_stderr)
+    report: Report = staticmethod(_to_stderr)
     pause: Callable[[], None] | None = None
     compiled = 0
-    told = False
+    reported = False
     spent_s = 0.0  # in the compiler, by all threads
 
 
@@ -58,9 +58,9 @@ def on_compile(watch: Watch | None) -> Watch | None:
     return before
 
 
-def on_trouble(tell: Tell | None) -> None:
-    """Pass the message about an unusable cache to `tell`, once per process; None is standard error."""
-    _state.tell, _state.told = tell or _to_stderr, False
+def on_trouble(report: Report | None) -> None:
+    """Pass the message about an unusable cache to `report`, once per process; None is standard error."""
+    _state.report, _state.reported = report or _to_stderr, False
 
 
 def on_pause(check: Callable[[], None]) -> None:
@@ -132,6 +132,6 @@ def _call(progress: Progress) -> None:
 
 def trouble(line: str) -> None:
     """Report an unusable cache, once per process."""
-    if not _state.told:
-        _state.told = True
-        _state.tell(line)
+    if not _state.reported:
+        _state.reported = True
+        _state.report(line)
