@@ -40,7 +40,8 @@ class EnergyParams:
     stall_m_s : stall speed (m/s, default 6.95).  Higher: the nose goes down earlier
     best_glide_m_s : speed of best glide (m/s, default 8.6).  Higher: flies faster against headwind
     fastest_m_s : maximum speed (m/s, default 18).  Lower: may not make headway against strong wind
-    inverted_m_s, inverted_stall_m_s : cruise and stall speed inverted; NaN: stays upright (m/s, default 14 and 11.3)
+    inverted_m_s, inverted_stall_m_s : cruise and stall speed inverted, NaN: stays upright (m/s, default 14 and 11.3).
+        Higher: flies faster inverted
     speed_trust_s : time for which a measured airspeed is used (s, default 0.5).  Higher: bridges longer dropouts
     speed_filter_s : time constant of the airspeed (s, default 1).  Higher: smoother but later
     headwind_found_s, headwind_lost_s : time constants of the headwind when rising and falling (s, default 1 and 30).

@@ -36,7 +36,7 @@ class StabiliseParams:
     roll_control_per_rate_s, roll_control_per_rate_error_s, roll_control_per_error : feed-forward (s), damping (s) and
         integral gain in roll (default 0.3, 0.12, 0.12).  Higher: stiffer, then oscillates; lower: drifts, overshoots
     elevator_per_pitch_rate_s, elevator_per_rate_error_s, elevator_per_pitch_error : the same in pitch (default 0.25,
-        0.35, 1)
+        0.35, 1).  Higher and lower: as in roll
     elevator_per_load : up-elevator per extra g of lift (default 0.155).  Higher: climbs in turns; lower: sinks
     load_limit : largest extra g compensated (default 3).  Lower: the nose drops in steep turns
     inverted_lift : lift available inverted, over the weight at cruise (default 1.3).  Higher: may stall inverted

@@ -5,8 +5,8 @@ Story          Straight flight until the estimator has converged.  At 60 s the G
                height and course are unknown.  After 3 s the autopilot circles gently at cruise, so as not to fly away;
                half a minute later it switches the motor off and glides, still circling.  At 120 s the fixes are back.
                2 s later it is on its course again and climbs back to its height.
-Verifies       Premerlani & Bizard: without GPS the matrix is still corrected, with the airspeed taken as the speed of
-               the last fix (Eqns 25-29), and the heading is found again when the course is back (Eqns 22-24)
+Verifies       Premerlani & Bizard: without GPS the roll-pitch correction continues with the speed of the last fix
+               (Eqns 25-29), and the heading is found again when the course is back (Eqns 22-24)
 Aircraft       endurance
 Wind           3 m/s from any direction, turbulence W20 = 3 m/s
 Sensors        generic; no fix from 60 s to 120 s

@@ -1,7 +1,7 @@
 """A yaw gyro that reads 10 % too low, in a continuous turn.
 
 =============  ===================================================================================================
-Story          The stick is put over and stays there: 20 degrees of bank to the right, 16 deg/s of heading.  The yaw
+Story          The stick is moved over and held: 20 degrees of bank to the right, 16 deg/s of heading.  The yaw
                gyro reads 90 % of it, as if its gain had never been calibrated: 1.5 degrees of turn are missing every
                second.
 Verifies       Premerlani & Bizard, "Calibration": in a continuous turn the error of a wrong gain is treated as an

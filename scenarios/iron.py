@@ -20,8 +20,8 @@ Passes when    it survives and stays clear of the ground; from 20 s to the end t
 In level flight a hard iron h in the horizontal field b turns the needle by up to asin(h / b): here 11.7 in 20.1 uT, 35
 degrees.  ``iron_uncalibrated`` flies on that heading, and does worse: along a wrong heading the change of the GPS
 velocity is taken for a tilt, and a tilt puts part of the vertical field, 2.4 times the horizontal one, into the
-heading.  There the estimator is not told that the receiver reports no vertical velocity, and uses its zero, as in the
-note of 2011.
+heading.  There the estimator assumes that the receiver measures the vertical velocity, which it does not, and uses its
+zero, as in the note of 2011.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 =============  ===================================================================================================
 Story          Straight and level until the estimator has converged.  Then every ten seconds the nose is raised and the
-               stick put over for a full roll, three times to the right and three times to the left.
+               stick moved over for a full roll, three times to the right and three times to the left.
                ``rolls_figures``: an Immelmann, half a loop and half a roll, and a split S, half a roll and half a loop.
                Each reverses the heading.
 Verifies       Premerlani & Bizard: rotations are integrated as a matrix, so no attitude is special (Eqns 17-21);

@@ -1,9 +1,8 @@
-"""The loop: the one place that orders the calls.
+"""The loop: the only place that determines the order of calls.
 
     plant -> truth -> sensors -> measurements -> estimator -> estimate -> autopilot -> command -> plant
 
-Nothing is written while flying except into the rows of the log.  Whatever ends a flight, the rows up to there
-are returned.
+In flight only the rows of the log are written.  However a flight ends, the rows up to then are returned.
 """
 
 from collections.abc import Callable
@@ -23,47 +22,35 @@ from sim.outside.signals import Interrupted, TimedOut, check, listening
 from sim.plant import Plant, SimulationDiverged
 from sim.sensors.suite import Suite
 
-Watch = Callable[[Log, int], None]  # shown the log and the number of its rows that are filled
+Watch = Callable[[Log, int], None]  # called with the log and the number of rows filled
 
 
 def fly(
-    plant: Plant,
-    suite: Suite,
-    estimator: AttitudeEstimator,
-    autopilot: Autopilot,
-    script: Script,
-    log: Log,
-    *,
-    calibration_s: float = 0.0,
-    on_ground: ImuSample | None = None,
-    manifest: dict[str, Any] | None = None,
+    plant: Plant, suite: Suite, estimator: AttitudeEstimator, autopilot: Autopilot, script: Script, log: Log, *,
+    calibration_s: float = 0.0, on_ground: ImuSample | None = None, manifest: dict[str, Any] | None = None,
     watch: Watch | None = None,
-) -> Flight:
+) -> Flight:  # fmt: skip
     """Fly until the rows of `log` are full or the flight ends.
 
     Parameters
     ----------
-    script          set-points by time since the release
-    calibration_s   time after power-up over which the inertial samples are averaged for ``estimator.reset``;
-                    0 where the flight starts in the air
-    on_ground       what ``estimator.reset`` is given then: a mean sample from before the flight, or None
-    manifest        seed, resolved configuration, versions: goes into the recording
-    watch           called once a simulated second with the log and the number of rows filled so far
+    script          setpoints by time since the release
+    calibration_s   time over which inertial samples are averaged for ``estimator.reset``; 0 for a start in the air
+    on_ground       sample for ``estimator.reset`` in that case: a mean from before the flight, or None
+    manifest        seed, resolved configuration, versions, for the recording
+    watch           called once per simulated second with the log and the number of rows filled so far
     """
-    outcome, message, k = Outcome.COMPLETED, "", 0
+    outcome, message, k, late, command = Outcome.COMPLETED, "", 0, 0, NEUTRAL
     reference: HeadingReference = "course"
-    second, tick_ns, late = round(1.0 / plant.dt_s), 1e9 * plant.dt_s, 0
+    second, tick_ns, n_calibration = round(1.0 / plant.dt_s), 1e9 * plant.dt_s, round(calibration_s / plant.dt_s)
     to_release_s = plant.dt_s - plant.release_s
-    command = NEUTRAL
     try:
         with listening():
             plant.reset(log)
             suite.reset(log)
             reference = make_ready(estimator, autopilot, log)
-            n_calibration = round(calibration_s / plant.dt_s)
             for k in range(len(log)):
-                ended = plant.advance(k, command)
-                if ended is not None:
+                if (ended := plant.advance(k, command)) is not None:
                     outcome = ended
                     break
                 measured = suite.measure(k)
@@ -83,26 +70,30 @@ def fly(
                         watch(log, k + 1)
             else:
                 k = len(log)
-    except FlightCodeFailed as failure:
-        outcome, message = failure.outcome, str(failure)
-    except SimulationDiverged as blow_up:
-        outcome, message = Outcome.DIVERGED, str(blow_up)
-    except Interrupted:
-        outcome, message = Outcome.INTERRUPTED, f"interrupted {k * plant.dt_s:.1f} s after power-up"
-    except TimedOut:
-        outcome = Outcome.TIMED_OUT
-        message = f"the time for this flight was up {k * plant.dt_s:.1f} s after power-up"
+    except (FlightCodeFailed, SimulationDiverged, Interrupted, TimedOut) as error:
+        outcome, message = _ending(error, k * plant.dt_s)
     flown = log.until(k)
     events = events_of(flown, outcome, message, script, plant.release_s)
     return Flight(flown, plant.dt_s, plant.release_s, outcome, reference, message, events, manifest or {}, late)
 
 
+def _ending(error: BaseException, t_s: float) -> tuple[Outcome, str]:
+    """Outcome and message of a flight that `error` ended at `t_s`."""
+    if isinstance(error, FlightCodeFailed):
+        return error.outcome, str(error)
+    if isinstance(error, Interrupted):
+        return Outcome.INTERRUPTED, f"interrupted {t_s:.1f} s after power-up"
+    if isinstance(error, TimedOut):
+        return Outcome.TIMED_OUT, f"the time for this flight was up {t_s:.1f} s after power-up"
+    return Outcome.DIVERGED, str(error)
+
+
 def make_ready(estimator: AttitudeEstimator, autopilot: Autopilot, log: Log) -> HeadingReference:
-    """Reset the autopilot; show the oracle, and nobody else, the log of the flight to come.
+    """Reset the autopilot; give the oracle, and no other estimator, the log of the flight.
 
     Returns what the heading of the estimator converges to.
     """
-    if issubclass(type(estimator), Oracle):  # isinstance() would believe a class that says it is one
+    if issubclass(type(estimator), Oracle):  # isinstance() could be fooled by the class
         estimator.watch(log)  # type: ignore[attr-defined]
     with blaming(Outcome.AUTOPILOT_FAILED, autopilot, 0.0):
         if hasattr(autopilot, "reset"):
@@ -112,7 +103,7 @@ def make_ready(estimator: AttitudeEstimator, autopilot: Autopilot, log: Log) -> 
 
 
 def power_up(estimator: AttitudeEstimator, on_ground: ImuSample | None) -> None:
-    """Switch the estimator on with the mean inertial sample `on_ground`, or None where there is none."""
+    """Reset the estimator with the mean inertial sample `on_ground`, or None if there is none."""
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, on_ground.t_s if on_ground else 0.0):
         if hasattr(estimator, "reset"):
             estimator.reset(on_ground)

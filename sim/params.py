@@ -4,7 +4,7 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
-from types import UnionType
+from types import MappingProxyType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from sim.outside.wording import brief
@@ -51,15 +51,19 @@ def words_of(name: str) -> str:
     return f"{words}, body axes" if f"_b{end}" in name else words
 
 
-def near_misses(name: str, names: Iterable[str]) -> str:
-    """End of a message about an unknown `name`: the most similar names, or all names."""
+def near_misses(name: str, names: Iterable[str], written: Mapping[str, str] = MappingProxyType({})) -> str:
+    """End of a message about an unknown `name`: the most similar names, or all names.
+
+    written : how to write a name, if not as it is
+    """
     possible = sorted(names)
     slips = difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.85)  # a typing error
     close = slips or difflib.get_close_matches(name.lower(), possible, n=3, cutoff=0.5)
     if not close and len(possible) > _MOST_NAMES:
         head = f"{name.partition('.')[0]}."
         possible = [n for n in possible if n.startswith(head)] or _by_heads(possible)
-    return f"did you mean {' or '.join(close)}?" if close else f"choose from {', '.join(possible)}"
+    to_write = list(dict.fromkeys(written.get(each, each) for each in close or possible))
+    return f"did you mean {' or '.join(to_write)}?" if close else f"choose from {', '.join(to_write)}"
 
 
 def _by_heads(names: list[str]) -> list[str]:

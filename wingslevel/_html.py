@@ -64,11 +64,13 @@ def page(title: str, below: str, *parts: str) -> str:
 
 def check_rows(rows: "Iterable[Row]") -> list[tuple[str, ...]]:
     """The lines of a verdict as cells."""
+    from sim.rows import limit_figures
+
     return [
         (
             text(f"{row.name} ({row.note})" if row.note else row.name),
-            number(row.measured),
-            f"{'≤' if row.sense == '<=' else '≥'} {number(row.limit)}",
+            row.figure if math.isfinite(row.measured) else number(None),
+            f"{'≤' if row.sense == '<=' else '≥'} {limit_figures(row.limit)}",
             text(row.unit),
             mark(row.passed, ("pass", "FAIL")),
         )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimator.rotation import to_euler
 from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, INK, ORANGE, RED, STYLE, VIOLET
 from sim.outside.wording import plotted
+from sim.rows import limit_figures
 from wingslevel._errors import WingslevelError
 from wingslevel._html import number
 from wingslevel._picture import Picture
@@ -166,7 +167,7 @@ def _verdict(axis: Any, flight: "Flight") -> None:
     axis.set_title("checks" if flight.judged else "scores")
     if flight.judged:
         lines = [
-            (row.name, f"{number(row.measured)} {row.unit}", f"{row.sense} {number(row.limit)}", row.passed)
+            (row.name, f"{row.figure} {row.unit}", f"{row.sense} {limit_figures(row.limit)}", row.passed)
             for row in flight.verdict.rows
         ]
     else:

@@ -199,4 +199,4 @@ def _why(v: "FlightVerdict") -> str:
     """Why a flight failed."""
     if v.message or v.broken:
         return v.ending
-    return ", ".join(f"{row.name} {number(row.measured)} {row.unit}".rstrip() for row in v.rows if not row.passed)
+    return ", ".join(f"{row.name} {row.figure} {row.unit}".rstrip() for row in v.rows if not row.passed)

@@ -140,7 +140,7 @@ def prepare(
     maker = None if isinstance(estimator, str) else estimator
     if estimator is not None:
         changes["estimator"] = maker_name(estimator)
-    config, suite = overridden(scenario.config, changes)
+    config, suite = overridden(scenario.config, changes, maker)
     return _prepare(scenario, config, suite, maker, lenient, kept)
 
 

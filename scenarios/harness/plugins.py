@@ -18,7 +18,7 @@ import importlib
 import inspect
 import numbers
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import is_dataclass
 from functools import partial
 from pathlib import Path
@@ -122,16 +122,17 @@ def equipped(
     return made
 
 
-def parameters_of(spec: str) -> set[str]:
+def parameters_of(spec: "str | Maker") -> set[str]:
     """Names of what can be set of the estimator `spec`: dotted fields of its ``params``, arguments of its constructor.
 
     Raises
     ------
     PluginError      as for `load_estimator`
     """
-    params = params_of(spec, load_estimator(spec))
+    maker = _find(_ESTIMATOR, spec) if isinstance(spec, str) else spec
+    params = params_of(spec, equipped(spec).code)
     named = set(dotted_fields(params)) if params is not None else set()
-    return named | (_arguments(_ESTIMATOR, spec, _find(_ESTIMATOR, spec)) - _NOT_SET)
+    return named | (_arguments(_ESTIMATOR, spec, maker) - _NOT_SET)
 
 
 def params_of(spec: "str | Maker", estimator: object) -> Any:
@@ -148,35 +149,6 @@ def _params(kind: _Kind, spec: "str | Maker", code: object) -> Any:
         return params
 
 
-def shared_settings(specs: Sequence[str], settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """`settings` for each of several estimators: those that it has, by the estimator's spec.
-
-    A name may begin with that of one estimator, ``premerlani.gps_latency_s``: it is for that one alone.
-
-    Raises
-    ------
-    ValueError      one line: a parameter that none of them has
-    """
-    short = {spec: short_name(spec) for spec in specs}
-    of_each: dict[str, dict[str, Any]] = {spec: {} for spec in specs}
-    has = {spec: parameters_of(spec) for spec in specs} if settings else {}
-    own = {key: key.partition(".") for key in settings if key.partition(".")[0] in short.values() and "." in key}
-    for key, value in settings.items():
-        if key in own:
-            continue
-        takers = [spec for spec in specs if key in has[spec]]
-        if not takers:
-            known = sorted(set().union(*has.values()))
-            who = f"estimator {specs[0]}" if len(specs) == 1 else f"any of {', '.join(specs)}"
-            hint = near_misses(key, known) if known else "they have none"
-            raise ValueError(f"unknown parameter {key!r} of {who}: {hint}")
-        for spec in takers:
-            of_each[spec][key] = value
-    for key, (head, _, rest) in own.items():  # after those for all: what is set for one estimator wins
-        of_each[next(spec for spec in specs if short[spec] == head)][rest] = settings[key]
-    return of_each
-
-
 def short_name(spec: "str | Maker") -> str:
     """What reports call an estimator: the name of its class, or of its library."""
     library = library_named(spec) if isinstance(spec, str) else None
@@ -184,17 +156,6 @@ def short_name(spec: "str | Maker") -> str:
         return library.short_name
     name, parenthesis, settings = maker_name(spec).partition("(")
     return f"{name.rpartition(':')[2]}{parenthesis}{settings}"
-
-
-def without(of_each: Mapping[str, Mapping[str, Any]], settings: Mapping[str, Any]) -> list[str]:
-    """A line for each of the `settings` that some of the estimators do not have, from `shared_settings`."""
-    lines = []
-    for key in settings:
-        takers = [spec for spec, own in of_each.items() if key in own]
-        if takers and len(takers) < len(of_each):
-            others = ", ".join(spec for spec in of_each if spec not in takers)
-            lines.append(f"{key} is set for {', '.join(takers)}; without that parameter: {others}")
-    return lines
 
 
 def equipped_autopilot(

@@ -1,1 +1,1 @@
-"""The aeroplanes, a folder each: numbers, the JSBSim model made from them, and where each figure comes from."""
+"""The aircraft, one folder each: geometry and trim (``airframe.toml``), JSBSim model, build script and sources."""

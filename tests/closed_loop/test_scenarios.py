@@ -19,7 +19,7 @@ TO_FAIL = {name for name, scenario in registered().items() if scenario.expected_
 
 @cache
 def flown(name: str, seed: int, estimator: str | None) -> Flight:
-    """A flight, flown once for all the tests that look at it; None is the scenario's own estimator."""
+    """A flight, cached for all tests that use it; None is the scenario's own estimator."""
     return fly_scenario(find(name), seed=seed, estimator=estimator)
 
 
@@ -31,21 +31,21 @@ def same(a: Flight, b: Flight) -> bool:
 
 
 class AlwaysLevel:
-    """Believes that it flies level and north whatever it is told."""
+    """Always estimates level and north."""
 
     def update(self, _m):
         return AttitudeEstimate(np.eye(3))
 
 
 class UpsideDown:
-    """Believes that it lies on its back."""
+    """Always estimates upside down."""
 
     def update(self, _m):
         return AttitudeEstimate(np.diag((1.0, -1.0, -1.0)))
 
 
 class RaisesAtThree:
-    """Gives up 3 s after power-up."""
+    """Raises 3 s after power-up."""
 
     def update(self, m):
         if m.imu.t_s > 3.0:
@@ -55,23 +55,23 @@ class RaisesAtThree:
 
 @pytest.mark.parametrize("name", sorted(set(NAMES) - TO_FAIL))
 def test_oracle_passes_every_scenario(name):
-    """Steering on the truth passes: what fails with an estimator is the estimator's fault."""
+    """With the true attitude every scenario passes: failures are due to the estimator."""
     scenario = find(name)
     verdict = Verdict.of((scenario, judge(scenario, flown(name, seed, "oracle"))) for seed in (0, 1))
     assert verdict.passed, verdict.to_markdown()
 
 
 @pytest.mark.parametrize("name", sorted(TO_FAIL))
-def test_oracle_is_not_what_fails_as_the_paper_says(name):
-    """The aeroplane flies on, and no check of the estimate finds the failure in the truth."""
+def test_oracle_does_not_pass_scenarios_that_expect_a_failure(name):
+    """With the true attitude the aeroplane flies on, and the expected failure does not occur."""
     flight = flown(name, 0, "oracle")
     assert flight.outcome == Outcome.COMPLETED
     assert not judge(find(name), flight).passed
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_its_own_estimator_passes_every_scenario(name):
-    """The gate of the project on two seeds; the pooled limits are for ten, so each flight has its own here."""
+def test_every_scenario_passes_with_its_own_estimator(name):
+    """The project's gate on two seeds, with the limits of single flights (the pooled limits are for ten seeds)."""
     scenario = find(name)
     for seed in (0, 1):
         verdict = judge(scenario, flown(name, seed, None))
@@ -81,7 +81,7 @@ def test_its_own_estimator_passes_every_scenario(name):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("broken", [AlwaysLevel, UpsideDown])
 def test_broken_estimator_fails_every_scenario(name, broken):
-    """A gate that lets through whoever does not look at the sensors is none."""
+    """An estimator that ignores its sensors must not pass."""
     scenario = find(name)
     assert not judge(scenario, fly_scenario(scenario, estimator=broken)).passed
 
@@ -104,7 +104,7 @@ def test_flight_of_the_same_seed_is_bit_equal_and_of_another_is_not():
 
 
 def test_flight_flown_again_from_its_manifest_is_bit_equal():
-    """The resolved configuration is all it takes."""
+    """The resolved configuration determines the flight."""
     scenario, overrides = find("hand_launch"), {"wind": "4@random", "gps.latency_s": "0.6", "duration_s": "6"}
     first = fly_scenario(scenario, overrides, seed=3)
     assert same(first, fly_config(scenario, FlightConfig(**first.manifest["config"])))
@@ -125,7 +125,7 @@ def test_hand_launch_is_held_thrown_and_then_flies():
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_wind_comes_from_where_it_was_said_to(side):
+def test_wind_blows_from_the_configured_direction(side):
     """5 m/s from the left of a northward flight blows east; turbulence off, so to the last digits of a degree."""
     from_deg, east_m_s = {"left": (270.0, 5.0), "right": (90.0, -5.0)}[side]
     overrides = {
@@ -142,7 +142,7 @@ def test_wind_comes_from_where_it_was_said_to(side):
 
 
 def test_turns_180_are_turns_of_the_course_by_half_a_circle():
-    """Three roll-outs; the course 10 s after each is the opposite of that before, within the weave of the hold."""
+    """Three roll-outs; 10 s after each the course is reversed, within the weave of the course hold."""
     flight = flown("turns_180", 0, "oracle")
     t_s, v = flight.log.truth["t_s"], flight.log.truth["v_e_m_s"]
     course = np.unwrap(np.arctan2(v[:, 1], v[:, 0]))
@@ -155,8 +155,8 @@ def test_turns_180_are_turns_of_the_course_by_half_a_circle():
     assert min(straight_s) >= 30.0
 
 
-def test_gyro_gain_is_learnt_as_the_offset_that_it_amounts_to():
-    """In a steady turn a gain of 0.9 is an offset of -0.1 times the rate; within the 1.5 % of the part's own gain.
+def test_gyro_gain_is_learnt_as_an_equivalent_offset():
+    """In a steady turn a gain of 0.9 equals an offset of -0.1 times the rate, within the part's gain error of 1.5 %.
 
     The true offset of the part, times 0.9, is in the truth; 0.3 deg/s is what gain and cross-axis of the part make
     of 16 deg/s at one sigma, and the scatter of what is learnt in turbulence.
@@ -169,18 +169,18 @@ def test_gyro_gain_is_learnt_as_the_offset_that_it_amounts_to():
     np.testing.assert_allclose(learnt.mean(), predicted, rtol=0, atol=np.radians(0.3))
 
 
-def test_gps_latency_is_harmless_where_the_estimator_is_told():
-    """The same late fixes, met by an equally late nose: a tenth of the heading error."""
+def test_gps_latency_is_harmless_if_the_estimator_knows_it():
+    """If the same late fixes are compared with the heading of that time, the heading error is a tenth."""
     scenario = find("gps_latency")
-    row = {"unaware": 0.0, "told": 0.0}
-    for name, changes in (("unaware", {}), ("told", {"estimator_params.gps_latency_s": 12.0})):
+    row = {"unaware": 0.0, "known": 0.0}
+    for name, changes in (("unaware", {}), ("known", {"estimator_params.gps_latency_s": 12.0})):
         verdict = judge(scenario, fly_scenario(scenario, changes, seed=0))
         row[name] = next(r.measured for r in verdict.rows if r.name.startswith("heading"))
-    assert row["told"] < 0.1 * row["unaware"]
+    assert row["known"] < 0.1 * row["unaware"]
 
 
-def test_hand_launch_with_the_accelerometer_alone_dives_because_it_believes_to_climb():
-    """The elevator is down and the nose falls while the estimate tells of a climb; the hand is `hand_launch`'s."""
+def test_hand_launch_with_the_accelerometer_alone_dives_while_it_estimates_a_climb():
+    """The elevator is down and the nose falls while the estimate shows a climb; the throw is that of `hand_launch`."""
     flight = flown("hand_launch_accelerometer", 0, None)
     falling = flight.log.truth[-25:-5]  # half a second, ending a tenth before the ground
     believed = flight.log.flown[-25:-5]
@@ -193,7 +193,7 @@ def test_hand_launch_with_the_accelerometer_alone_dives_because_it_believes_to_c
 
 @pytest.mark.parametrize("degrees", [30.0, 45.0, 60.0])
 def test_turns_180_at_a_bank_carry_the_load_of_it(degrees):
-    """A level turn needs 1 / cos(bank) of lift: 2 at 60 degrees; the middle of what was felt, within turbulence."""
+    """A level turn needs a load factor of 1 / cos(bank), 2 at 60 degrees: the median, within turbulence."""
     flight = flown(f"turns_180_bank_{degrees:g}", 0, "oracle")
     truth = flight.log.truth
     bank = np.degrees(np.abs(np.arctan2(truth["R_eb"][:, 2, 1], truth["R_eb"][:, 2, 2])))

@@ -1,4 +1,4 @@
-"""What every registered scenario obeys, and what the registry says of those that are none."""
+"""The contract of every registered scenario, and the errors of the registry."""
 
 import json
 from pathlib import Path
@@ -18,8 +18,8 @@ NAMES = sorted(registered())
 SECTIONS = ("Story", "Verifies", "Aircraft", "Wind", "Sensors", "Passes when")
 
 
-def test_registry_holds_the_five_scenarios_by_the_names_of_their_files():
-    """Found by listing the package; a file that is none would have been an error."""
+def test_registry_names_scenarios_after_their_files():
+    """Every file of the package is a scenario, under the name of its file."""
     assert set(NAMES) >= {"hand_launch", "crosswind", "turns_180", "loops", "return_to_launch"}
     files = {path.stem for folder in scenarios.__path__ for path in Path(folder).glob("*.py")}
     assert {name for name in NAMES if name in files} == files - {"__init__"}
@@ -28,7 +28,7 @@ def test_registry_holds_the_five_scenarios_by_the_names_of_their_files():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scenario_story_has_every_section(name):
-    """The docstring of the file is the table that people read."""
+    """The docstring of the file is a table with all sections."""
     scenario = find(name)
     assert scenario.name == name
     lines = scenario.story.splitlines()
@@ -38,8 +38,8 @@ def test_scenario_story_has_every_section(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_scenario_resolves_alike_from_the_same_seed_and_survives_json(name):
-    """The resolved configuration is plain numbers, the same each time, another for another seed."""
+def test_scenario_resolves_the_same_from_the_same_seed_and_through_json(name):
+    """The resolved configuration is plain numbers: equal for equal seeds, different for others."""
     scenario = find(name)
     first = resolve(scenario.config)
     assert resolve(scenario.config) == first
@@ -50,7 +50,7 @@ def test_scenario_resolves_alike_from_the_same_seed_and_survives_json(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scenario_script_begins_at_the_start_and_ends_before_the_flight(name):
-    """Nothing is commanded that is never flown; the first set-point is there from the start."""
+    """The first set-point is in force from the start, the last before the end."""
     scenario = find(name)
     config = resolve(scenario.config)
     timed = list(scenario.script(config))
@@ -61,15 +61,15 @@ def test_scenario_script_begins_at_the_start_and_ends_before_the_flight(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scenario_checks_demand_survival_and_say_their_units(name):
-    """A name, a unit for all that has a dimension, and survival first, but where the point is that it does not."""
+    """Every check has a name and, unless it counts, a unit; survival is first, unless a crash is expected."""
     checks = find(name).checks
     assert checks[0].name == "survived" or find(name).expected_to_fail
     assert all(check.name and (check.unit or check.name == "survived") for check in checks)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_scenario_checks_have_metric_names_of_their_own(name):
-    """No name among the metrics of a flight is numbered: neither a general metric nor another check has it."""
+def test_scenario_checks_have_unique_metric_names(name):
+    """No metric of a flight has to be numbered: no check has the name of a general metric or of another check."""
     general = summary(Flight(Log.empty(0), 0.02, 0.0, Outcome.DIVERGED, "course"))
     names = [*general, *(metric_name(check.name, check.unit) for check in find(name).checks)]
     assert len(set(names)) == len(names)
@@ -78,7 +78,7 @@ def test_scenario_checks_have_metric_names_of_their_own(name):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("n_ticks", [0, 1, 500])
 def test_scenario_checks_fail_a_flight_that_ended_early(name, n_ticks):
-    """No check of the estimate or the manoeuvre passes on a flight of no, one or 500 ticks, and none raises."""
+    """On a flight of no, one or 500 ticks no check of estimate or manoeuvre passes, and none raises."""
     scenario = find(name)
     log = Log.empty(n_ticks)
     log.truth["R_eb"], log.truth["phase"] = log.flown["R_eb"], Phase.FLYING
@@ -107,13 +107,13 @@ def test_varied_overrides_limits_only_and_rejects_unknown_checks():
 
 
 def test_find_of_an_unknown_scenario_names_the_near_misses():
-    """One line, with what was probably meant."""
+    """One line, with similar names."""
     with pytest.raises(ValueError, match=r"unknown scenario 'hand_lunch': did you mean hand_launch"):
         find("hand_lunch")
 
 
-def test_find_of_ones_own_file_is_its_scenario(tmp_path):
-    """A file that exports SCENARIO is as good as a registered one."""
+def test_find_of_a_file_is_its_scenario(tmp_path):
+    """A file that exports SCENARIO works as a registered scenario does."""
     path = tmp_path / "mine.py"
     path.write_text(
         "from dataclasses import replace\n"
@@ -131,8 +131,8 @@ def test_find_of_ones_own_file_is_its_scenario(tmp_path):
         ("def (\n", "SyntaxError"),
     ],
 )
-def test_find_of_a_file_that_holds_none_is_refused_in_one_line(tmp_path, text, words):
-    """Whatever is wrong in the file, the line names it."""
+def test_find_of_a_file_without_a_scenario_is_one_line(tmp_path, text, words):
+    """The line names what is wrong in the file."""
     path = tmp_path / "broken.py"
     path.write_text(text)
     with pytest.raises(ValueError, match=words) as refused:
@@ -141,7 +141,7 @@ def test_find_of_a_file_that_holds_none_is_refused_in_one_line(tmp_path, text, w
     assert "\n" not in str(refused.value)
 
 
-def test_find_of_a_file_that_is_not_there_is_refused(tmp_path):
-    """The path as it was typed."""
+def test_find_of_a_missing_file_is_one_line(tmp_path):
+    """The line has the path as typed."""
     with pytest.raises(ValueError, match="no file"):
         find(str(tmp_path / "nowhere.py"))

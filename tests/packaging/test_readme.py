@@ -151,7 +151,7 @@ def test_exceptions_are_all_needed() -> None:
     assert len(not_run) < 0.25 * len(every)
 
 
-@pytest.mark.parametrize("document", [d for d in DOCUMENTS if any(b.language != "text" for b in blocks_of(d))])
+@pytest.mark.parametrize("document", [d for d in DOCUMENTS if blocks_of(d)])
 def test_blocks_of_a_document_run_in_order(document: str, here: Path) -> None:
     """Commands, Python and data of a page, from top to bottom, in a folder of their own."""
     for command in BEFORE.get(document, ()):

@@ -240,6 +240,31 @@ def test_example_in_c_follows_the_python_filter_through_bad_samples(example):
     assert theirs.rejected == ours.rejected == 35  # 30 of the gyro; force, fix, two times, the clock set back
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_example_never_leaves_the_rotations_whatever_the_samples_are(example, seed):
+    """Any number in any column at any time, and a clock that leaps: a rotation and finite rates at every tick."""
+    rng = np.random.default_rng(seed)
+    rows = np.zeros(3000, MEASURED_DTYPE)
+    rows["t_s"] = np.cumsum(rng.choice([0.02, 0.02, 0.02, 0.0, -0.5, -1.5, 0.3, 1e6], 3000))
+    rows["dt_s"] = 0.02
+    absurd = np.array([np.nan, np.inf, -np.inf, 1e308, -1e308, 1e30, 5e-324, 36.0, -36.0, 160.0, 999.0, 0.0, -1.0])
+    for name in MEASURED_DTYPE.names:
+        if MEASURED_DTYPE[name].kind == "i":
+            rows[name] = rng.integers(0, 2, 3000)
+        elif name != "t_s":
+            hit = rng.random(rows[name].shape) < 0.05
+            if name != "dt_s":
+                rows[name] = rng.normal(0.0, 10.0, rows[name].shape)
+            rows[name][hit] = rng.choice(absurd, np.count_nonzero(hit))
+    estimator = load_estimator(str(example))
+    for k in range(len(rows)):
+        estimate = estimator.update(Measurements(rows, k))
+        assert np.abs(estimate.R_eb @ estimate.R_eb.T - np.eye(3)).max() < 1e-2
+        assert np.linalg.det(estimate.R_eb) > 0.0
+        assert np.all(np.isfinite([estimate.omega_b_rad_s, estimate.gyro_bias_b_rad_s]))
+    assert estimator.rejected > 1000
+
+
 def test_example_turns_fast_rotations_in_parts(example):
     """At 20 rad/s for 0.2 s: three parts a tick of 0.133 rad, each short by a third of its cube."""
     estimator = load_estimator(str(example))

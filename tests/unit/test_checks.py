@@ -1,4 +1,4 @@
-"""Checks: what passes, what never may, and how flights are pooled."""
+"""Checks: limits, incomplete measurements, and how flights are pooled."""
 
 import math
 
@@ -35,14 +35,14 @@ def rows_of(values, **more):
     ],
 )
 def test_judge_at_the_limit_passes_and_one_digit_beyond_does_not(value, sense, passes):
-    """The limit itself is allowed."""
+    """The limit itself passes; the next larger number does not."""
     assert check_of(value, sense=sense).judge(FLIGHT).passed is passes
 
 
 @pytest.mark.parametrize("sense", ["<=", ">="])
 @pytest.mark.parametrize("pooled", ["rms", "worst", "count"])
 def test_judge_and_pool_of_nan_fail(sense, pooled):
-    """What is not a number passes no limit, alone or among good flights."""
+    """NaN fails every limit, alone or among good flights."""
     good = 1.0 if sense == "<=" else 9.0
     check, rows = rows_of([good, math.nan, good], sense=sense, pooled=pooled)
     assert [row.passed for row in rows] == [True, False, True]
@@ -50,7 +50,7 @@ def test_judge_and_pool_of_nan_fail(sense, pooled):
 
 
 def test_judge_and_pool_of_too_few_samples_fail_with_a_note():
-    """The best of values on half a window does not pass, and the row says why."""
+    """A perfect value over half a window fails, and the note says why."""
     row = check_of(0.0, samples=250, expected=500).judge(FLIGHT)
     assert not row.passed
     assert row.note == "250 of 500 samples"
@@ -60,7 +60,7 @@ def test_judge_and_pool_of_too_few_samples_fail_with_a_note():
 
 
 def test_judge_of_an_empty_window_fails():
-    """No samples where none were expected is a mistake in the scenario, not a pass."""
+    """A window without any samples is a mistake in the scenario, not a pass."""
     assert not check_of(0.0, samples=0, expected=0).judge(FLIGHT).passed
 
 
@@ -74,13 +74,13 @@ def test_pool_by_rms_is_the_root_of_the_mean_square(values):
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=20), st.sampled_from(["<=", ">="]))
 def test_pool_by_worst_is_the_value_furthest_over_the_limit(values, sense):
-    """The largest where small is good, the smallest where large is."""
+    """The largest value of an upper limit, the smallest of a lower one."""
     check, rows = rows_of(values, sense=sense)
     assert check.pool(rows).measured == (max(values) if sense == "<=" else min(values))
 
 
 def test_pool_by_count_counts_the_flights_that_pass():
-    """Two of three is not three of three."""
+    """Two of three flights fail the count."""
     check, rows = rows_of([1.0, 5.0, 2.0], pooled="count")
     pooled = check.pool(rows)
     assert (pooled.measured, pooled.limit, pooled.unit, pooled.passed) == (2, 3, "flights", False)
@@ -88,7 +88,7 @@ def test_pool_by_count_counts_the_flights_that_pass():
 
 
 def test_pool_of_several_flights_uses_the_pooled_limit_and_of_one_its_own():
-    """A flight may be 1.5 times as bad as all together; alone it is judged as a flight."""
+    """A single flight may be 1.5 times as bad as all flights together."""
     check, rows = rows_of([5.0, 5.0], pooled="rms", per_flight_limit=6.0)
     assert all(row.passed for row in rows)
     assert not check.pool(rows).passed
@@ -96,7 +96,7 @@ def test_pool_of_several_flights_uses_the_pooled_limit_and_of_one_its_own():
 
 
 def test_pool_of_nothing_fails():
-    """No flights, no pass."""
+    """Without flights nothing passes."""
     for pooled in ("rms", "worst", "count"):
         assert not check_of(1.0, pooled=pooled).pool([]).passed
 
@@ -111,7 +111,7 @@ def test_check_with_a_per_flight_limit_out_of_bounds_is_refused(per_flight):
 
 
 def test_check_without_a_finite_limit_is_refused():
-    """A limit that nothing can break is none."""
+    """An infinite limit would always pass."""
     with pytest.raises(ValueError, match="must be a finite number"):
         check_of(1.0, limit=math.inf)
 

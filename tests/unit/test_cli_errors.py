@@ -107,7 +107,7 @@ def test_json_into_a_pipe_is_written_into_it(tmp_path: Path) -> None:
         (("fly", "crosswind", "--duration", "nan"), "'nan': write a plain finite number"),
         (("fly", "crosswind", "--duration", "\u0663"), "write a plain finite number"),
         (("fly", "crosswind", "--duration", "1e-320"), "one tick of the loop"),
-        (("fly", "crosswind", "--duration", "36000", "--imu-rate", "200"), "at most 12255 s at 200 Hz, for the log is"),
+        (("fly", "crosswind", "--duration", "36000", "--imu-rate", "200"), "at most 12255 s at 200 Hz: the log is"),
         (("fly", "crosswind", "--seed", "9" * 5000), "write a whole number"),
         (("fly", "crosswind", "--seed", str(2**32)), "must be at most 4294967295"),
         (("fly", "crosswind", "--set", "duration_s=1_000"), "duration_s = 1_000 s: write a plain finite number"),

@@ -147,6 +147,32 @@ def test_list_of_one_kind_shows_that_kind_alone(kind: str, capsys) -> None:
     assert capsys.readouterr().out.splitlines()[0].strip() == kind
 
 
+def test_list_of_parameters_says_default_unit_and_effect(capsys) -> None:
+    """As JSON and as a table; what --set is written in front of is in its heading."""
+    assert run(["list", "estimators", "premerlani", "--params", "--json", "-"]) == 0
+    found = json.loads(capsys.readouterr().out)["estimators"]["premerlani"]
+    assert set(found["k_p"]) == {"default", "unit", "meaning", "raised", "lowered"}
+    assert (found["k_p"]["default"], found["k_p"]["unit"]) == (1.0, "1/s")
+    assert found["force_full_scale_m_s2"]["default"] == "inf"
+    assert all(found["k_p"].values())
+    assert run(["list", "estimators", "premerlani", "--params"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert out.startswith("premerlani: --set premerlani.NAME=VALUE")
+    assert f"k_p 1 1/s {found['k_p']['meaning'][:15]}" in out
+
+
+def test_list_of_parameters_of_your_own_class(package: Path, capsys) -> None:
+    """Also from a file; a class without parameters says so."""
+    assert run(["list", "estimators", f"{package / 'filters.py'}:MyFilter", "--params"]) == 0
+    assert "--set my_filter.NAME=VALUE" in (out := capsys.readouterr().out)
+    assert "no parameters" in out
+
+
+def test_list_of_parameters_of_another_kind_is_refused(refused) -> None:
+    """Exit code 2, one line."""
+    assert "only estimators have parameters" in refused("list", "scenarios", "--params")
+
+
 def test_list_of_an_unknown_kind_or_name_suggests_one(refused) -> None:
     """Exit code 2, one line."""
     assert "did you mean estimators?" in refused("list", "estimatrs")

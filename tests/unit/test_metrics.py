@@ -77,7 +77,7 @@ def since_release_s(flight):
 
 @pytest.mark.parametrize("tilt_deg", [1e-5, 3.0, 90.0, 179.0])
 def test_inclination_error_of_a_tilted_estimate_is_the_tilt(tilt_deg):
-    """Tilting the estimate about a horizontal axis is the inclination error whole, whatever the true attitude."""
+    """A tilt of the estimate about a horizontal axis is entirely inclination error, at any true attitude."""
     flight = made_up(1.0)
     true = Rotation.from_euler("ZYX", (130.0, 20.0, -40.0), degrees=True)
     tilt = Rotation.from_rotvec(np.radians(tilt_deg) * np.array([0.6, 0.8, 0.0]))
@@ -88,7 +88,7 @@ def test_inclination_error_of_a_tilted_estimate_is_the_tilt(tilt_deg):
 
 
 def test_inclination_error_of_a_heading_error_is_zero():
-    """Turning the estimate about the vertical moves the heading and the whole angle, and leaves the inclination."""
+    """A rotation of the estimate about the vertical is heading and attitude error, and no inclination error."""
     flight = made_up(1.0, reference="nose")
     flight.log.truth["R_eb"] = attitudes(170.0, 10.0, 30.0)
     flight.log.flown["R_eb"] = attitudes(-165.0, 10.0, 30.0)
@@ -113,7 +113,7 @@ def test_heading_error_in_a_crab_is_against_what_the_estimator_names():
 
 
 def test_heading_error_steep_or_slow_is_not_judged():
-    """Above 64 degrees of pitch and below 3 m/s over the ground, heading means nothing."""
+    """Heading is not judged above 64 degrees of pitch, nor below 3 m/s over ground."""
     flight = made_up(3.0)
     t_s = since_release_s(flight)
     flight.log.truth["R_eb"] = attitudes(0.0, np.where(t_s > 2.0, 70.0, 60.0), n=len(t_s))
@@ -123,7 +123,7 @@ def test_heading_error_steep_or_slow_is_not_judged():
 
 
 def test_errors_in_the_hand_are_not_judged():
-    """Times count from the release: an error in the hand changes nothing."""
+    """Only errors after the release count."""
     flight = made_up(20.0)
     held = since_release_s(flight) < DT_S / 2
     flight.log.flown["R_eb"][held] = attitudes(0.0, 45.0)
@@ -156,7 +156,7 @@ def test_window_counts_the_ticks_that_end_within_it():
 
 
 def test_window_of_a_flight_that_ended_early_is_incomplete():
-    """Half a window is no window, however good its value."""
+    """A value over half a window is incomplete, however good it is."""
     measured = over(inclination_error_deg, rms, at(5.0), end)(made_up(12.0, planned_s=20.0))
     assert measured.value == 0.0
     assert not measured.complete
@@ -165,14 +165,14 @@ def test_window_of_a_flight_that_ended_early_is_incomplete():
 
 @pytest.mark.parametrize("window", [(at(5.0), at(5.0)), (at(8.0), at(5.0)), (at(math.nan), end)])
 def test_window_that_is_empty_measures_nothing(window):
-    """No window, or one that begins at a moment that never came, is not passed by anything."""
+    """An empty window, or one that begins at a moment that never came, measures nothing."""
     measured = over(inclination_error_deg, rms, *window)(made_up(20.0))
     assert math.isnan(measured.value)
     assert not measured.complete
 
 
 def test_window_judged_too_rarely_is_incomplete():
-    """Where heading could be judged for half the window only, nine tenths are missing."""
+    """If heading was judged in half of the window, a required share of nine tenths is not met."""
     flight = made_up(20.0)
     flight.log.truth["v_e_m_s"][since_release_s(flight) < 10.0] = 0.0
     assert not over(heading_error_deg(), rms, judged_share=0.9)(flight).complete
@@ -213,7 +213,7 @@ def test_gyro_bias_wind_and_orthogonality_errors_are_the_differences_put_in():
 
 
 def test_rate_error_of_one_axis_is_estimate_less_truth():
-    """-20 deg/s about y told as -18.5, and x and z wrong by more: 1.5 deg/s, of a true 20."""
+    """-20 deg/s about y estimated as -18.5, with larger errors about x and z: 1.5 deg/s, of a true 20."""
     flight = made_up(2.0)
     flight.log.truth["imu_omega_b_rad_s"] = np.radians([3.0, -20.0, 7.0])
     flight.log.flown["omega_b_rad_s"] = np.radians([30.0, -18.5, -70.0])
@@ -232,8 +232,8 @@ def test_wind_error_where_none_is_estimated_is_not_judged():
     assert len(wind_error_m_s(made_up(2.0)).judged_values) == 0
 
 
-def test_heights_of_a_climb_are_read_where_asked():
-    """A dip to 1.2 m and a climb of 2 m/s: the lowest point, and the height at 20 s, and none after the end."""
+def test_heights_of_a_climb_are_read_at_their_times():
+    """A dip to 1.2 m and a climb of 2 m/s: the lowest point, the height at 20 s, and no height after the end."""
     flight = made_up(20.0)
     t_s = since_release_s(flight)
     flight.log.truth["p_e_m"][:, 2] = -np.maximum(2.0 * t_s, 1.2)
@@ -262,7 +262,7 @@ def test_bank_is_the_size_of_the_roll_whatever_pitch_and_heading(roll_deg):
 
 
 def test_pass_over_the_launch_point_is_timed_and_measured():
-    """Flying past at 12 m/s, 7 m beside: nearest 7 m after 300 m, first within 25 m as Pythagoras has it."""
+    """A pass at 12 m/s and 7 m: the nearest distance, and by Pythagoras the first time within 25 m."""
     flight = made_up(60.0)
     t_s = since_release_s(flight)
     flight.log.truth["p_e_m"][:, 0] = -300.0 + 12.0 * t_s
@@ -344,7 +344,7 @@ def test_loops_flown_are_counted_and_timed():
 
 
 def test_loops_that_were_not_flown_never_end():
-    """Two loops are not three; a dive, a roll and an outside loop are none."""
+    """Two loops are not three; dives, rolls and outside loops do not count."""
     t_s = np.arange(1, 1001) * DT_S
     assert math.isnan(loops_end_s(3)(looping(np.clip(110.0 * t_s, 0.0, 720.0))))
     assert most_loops(looping(-np.clip(110.0 * t_s, 0.0, 360.0))).value == pytest.approx(0.0, rel=0, abs=1e-9)
@@ -372,7 +372,7 @@ def test_summary_is_plain_and_finite_or_none():
 
 @pytest.mark.parametrize(("reference", "off_deg"), [("course", 12.0), ("nose", 22.0)])
 def test_summary_heading_is_against_what_the_estimator_names(reference, off_deg):
-    """North over the ground, nose at 350 degrees, estimate at 12: one of the two errors, by the estimator's word."""
+    """North over the ground, nose at 350 degrees, estimate at 12: the error of the estimator's own reference."""
     flight = made_up(1.0, reference=reference)
     flight.log.truth["R_eb"], flight.log.flown["R_eb"] = attitudes(350.0), attitudes(12.0)
     numbers = summary(flight)

@@ -43,7 +43,7 @@ def test_route_flown_exactly_is_never_off_it_and_reaches_every_waypoint():
 
 
 def test_route_flown_beside_is_off_by_as_much_and_too_low_counts_as_height_missing():
-    """10 m east and 5 m down: off the northward and southward legs by 10 m, along the others by none."""
+    """10 m east and 5 m low: 10 m off the legs that lead north or south, on the others."""
     flight = along(*LAPPED, offset=10.0, up=-5.0)
     off = off_route_m(SQUARE)(flight).value
     np.testing.assert_allclose(off[50:150], 10.0, rtol=0, atol=1e-9)
@@ -53,7 +53,7 @@ def test_route_flown_beside_is_off_by_as_much_and_too_low_counts_as_height_missi
 
 
 def test_route_flown_the_other_way_round_reaches_none_in_order():
-    """Being near a waypoint is not enough, it must be the next one."""
+    """A waypoint counts only if it is the next one."""
     backwards = along((0, 0, 60), (0, 200, 60), (200, 200, 100), (150, 200, 100))
     assert waypoints_reached(SQUARE)(backwards).value == 0
     assert off_route_m(SQUARE)(backwards).value.max() > 150.0
@@ -61,7 +61,7 @@ def test_route_flown_the_other_way_round_reaches_none_in_order():
 
 @pytest.mark.parametrize(("near_m", "count"), [(30.0, 3), (20.0, 0)])
 def test_waypoint_passed_at_a_distance_counts_within_it(near_m, count):
-    """The square cut 25 m inside of its corners."""
+    """The square with its corners cut by 25 m."""
     inside = np.sqrt(0.5) * 25.0
     ring = [(200 - inside, inside), (200 - inside, 200 - inside), (inside, 200 - inside), (inside + 50.0, 100.0)]
     flight = along((100.0, inside, 60.0), *((n, e, 60.0) for n, e in ring))
@@ -69,13 +69,13 @@ def test_waypoint_passed_at_a_distance_counts_within_it(near_m, count):
 
 
 def test_reached_of_a_flight_that_never_flew_is_empty():
-    """Nothing was reached, and nothing breaks."""
+    """No waypoint is reached, and nothing raises."""
     assert len(reached(np.zeros((0, 3)), SQUARE)) == 0
     assert np.isnan(waypoints_reached(SQUARE)(flight_of([], [], [])).value)
 
 
 @pytest.mark.parametrize("route", [SQUARE[:1], (*SQUARE, Waypoint(10, 0, 60))])
 def test_reached_route_whose_waypoints_overlap_is_refused(route):
-    """One waypoint alone, or two within reach of one place: counting would never end."""
+    """With one waypoint, or two within reach of one place, counting would never end."""
     with pytest.raises(ValueError, match=r"must be more than 60 m"):
         reached(np.zeros((10, 3)), route)

@@ -18,7 +18,7 @@ from sim.log import Flight, Log, Outcome, Phase
 
 
 def scenario_of(name="level"):
-    """A scenario that wants a tilt, read from the message of the made-up flights, of at most 4 degrees pooled."""
+    """A scenario with a tilt of at most 4 degrees pooled; the tilt comes from the manifest of the made-up flights."""
     tilt = Check("tilt RMS", "deg", lambda f: Measured(f.manifest["tilt"]), 4.0, pooled="rms", per_flight_limit=6.0)
     script = Script([Timed(0.0, Setpoint(Mode.STABILISE))])
     return Scenario(name, "", FlightConfig(), lambda _config: script, (SURVIVED, tilt))
@@ -62,7 +62,7 @@ def test_verdict_gates_each_flight_too():
 
 
 def test_verdict_on_nothing_fails():
-    """A gate that judged no flight is shut."""
+    """Without flights the gate fails."""
     assert verdict_of().exit_code == 1
 
 
@@ -112,7 +112,7 @@ def test_json_holds_every_check_of_every_flight_and_pooled():
 
 
 def test_junit_counts_what_it_holds_and_survives_any_message():
-    """As many cases and failures as the attributes say, from a message full of what XML forbids."""
+    """Counts agree with the attributes, with a message full of characters that XML forbids."""
     verdict = verdict_of(flown(3.0), flown(7.0, 1, Outcome.ESTIMATOR_FAILED, 'Mine at 3 s: <"bad"> & \x00\x1b[0m'))
     root = ElementTree.fromstring(verdict.to_junit())
     (suite,) = root.findall("testsuite")
@@ -127,7 +127,7 @@ def test_junit_counts_what_it_holds_and_survives_any_message():
 
 
 def test_markdown_shows_failed_flights_with_their_numbers():
-    """The pooled table always, a flight's own where it failed."""
+    """The pooled table always, the table of a flight only if it failed."""
     text = verdict_of(flown(3.0), flown(7.0, 1, Outcome.GROUND_CONTACT)).to_markdown()
     assert text.startswith("# Verdict: FAILED")
     assert "## level, premerlani, 2 flights" in text
@@ -172,7 +172,7 @@ def test_metrics_of_checks_with_names_that_are_taken_are_numbered():
 
 
 def died(seed, estimator="premerlani"):
-    """A flight of which nothing is left."""
+    """A flight whose process died."""
     return FlightVerdict("level", estimator, seed, Outcome.WORKER_DIED, (), {}, "killed by signal 9")
 
 
@@ -184,7 +184,7 @@ def verdict_with_dead(*seeds):
 
 
 def test_flight_without_rows_is_missing_from_the_pool_and_fails_it():
-    """The checks are taken over the flights that are there, which does not make them passed."""
+    """The checks are pooled over the flights that finished, and fail."""
     verdict = verdict_with_dead(2)
     (pool,) = verdict.pooled
     assert not verdict.passed
@@ -198,7 +198,7 @@ def test_flight_without_rows_is_missing_from_the_pool_and_fails_it():
 
 
 def test_flight_without_rows_is_one_line_of_markdown_and_one_error():
-    """A process that died says so once."""
+    """A process that died is reported once."""
     verdict = verdict_with_dead(2)
     text = verdict.to_markdown()
     assert text.count("worker_died: killed by signal 9") == 1
@@ -231,7 +231,7 @@ def test_flights_that_all_died_are_a_verdict_too():
     [Outcome.ESTIMATOR_FAILED, Outcome.AUTOPILOT_FAILED, Outcome.TIMED_OUT, Outcome.DIVERGED, Outcome.INTERRUPTED],
 )
 def test_junit_flight_that_ended_in_an_error_is_one_error_and_no_failure(outcome):
-    """Its checks say nothing that the error does not say."""
+    """Its checks are not reported beside the error."""
     root = ElementTree.fromstring(verdict_of(flown(9.0, outcome=outcome, message="Mine: why")).to_junit())
     assert (root.get("errors"), root.get("failures")) == ("1", "0")
     (error,) = root.findall("testsuite/testcase/error")
@@ -239,7 +239,7 @@ def test_junit_flight_that_ended_in_an_error_is_one_error_and_no_failure(outcome
 
 
 def test_flight_that_ended_in_an_error_has_not_passed_whatever_was_measured():
-    """Half a flight within the limits is half a flight."""
+    """A flight cut short by an error fails, even if all its checks pass."""
     tilt = Check("tilt", "deg", lambda f: Measured(1.0), 4.0)
     scenario = replace(scenario_of(), checks=(tilt,))
     verdict = verdict_of(flown(1.0, outcome=Outcome.TIMED_OUT), scenario=scenario)
@@ -248,7 +248,7 @@ def test_flight_that_ended_in_an_error_has_not_passed_whatever_was_measured():
 
 
 def test_junit_times_of_the_cases_add_up_to_those_of_the_flights():
-    """The time of a flight is that of its first case; the result is the same with it and without."""
+    """The first case of a flight carries its time; times do not change the result."""
     scenario = scenario_of()
     judged = [judge(scenario, flown(3.0, seed)) for seed in (0, 1)]
     timed = [replace(flight, wall_s=wall_s) for flight, wall_s in zip(judged, (1.25, 2.5), strict=True)]

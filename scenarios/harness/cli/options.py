@@ -1,4 +1,4 @@
-"""The options that several commands take, and what they change in the configuration of a flight."""
+"""Options shared by several commands, and the configuration entries that they change."""
 
 import inspect
 import os
@@ -14,19 +14,19 @@ from scenarios.harness.cli.reports import refusal
 from scenarios.harness.cli.values import number_in, whole_in
 from sim.outside.wording import brief
 
-# Each takes a few hundred megabytes; more of them than processors only wait for one another.
+# Each takes a few hundred megabytes, and more of them than processors bring no speed.
 MOST_WORKERS = max(64, 4 * (os.cpu_count() or 1))
 
 ScenarioArgument = Annotated[
     str,
-    typer.Argument(help="Name of a scenario, or file.py of your own.", autocompletion=complete.scenarios),
+    typer.Argument(help="Name of a scenario, or the path of your own file.py.", autocompletion=complete.scenarios),
 ]
 KindArgument = Annotated[
     str | None,
     typer.Argument(help="scenarios, estimators, autopilots, aircraft, suites or parts.", autocompletion=complete.kinds),
 ]
-NamesArgument = Annotated[list[str] | None, typer.Argument(help="Some of that kind; all by default.")]
-ParamsOption = Annotated[bool, typer.Option("--params", help="The parameters of estimators, for --set.")]
+NamesArgument = Annotated[list[str] | None, typer.Argument(help="Names to list. [default: all of that kind]")]
+ParamsOption = Annotated[bool, typer.Option("--params", help="List the parameters of estimators, for --set.")]
 EstimatorOption = Annotated[
     str | None,
     typer.Option(
@@ -36,20 +36,24 @@ EstimatorOption = Annotated[
 ]  # fmt: skip
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Any other parameter, for instance gps.latency_s=0.5."),
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="Any other parameter, for example gps.latency_s=0.5 or my_filter.k_p=1."
+    ),
 ]
 WindOption = Annotated[
     str | None,
-    typer.Option("--wind", metavar="M/S@DEG", help="Speed and direction it comes from: 5@270, 5@cross, 5@head, calm."),
+    typer.Option(
+        "--wind", metavar="M/S@DEG", help="Wind speed and direction it blows from: 5@270, 5@cross, 5@head, calm."
+    ),
 ]
 ShearOption = Annotated[
     str | None,
-    typer.Option("--shear", metavar="EXP", help="Growth of the wind with height: 0 none, 0.14 open country."),
+    typer.Option("--shear", metavar="EXP", help="Exponent of the wind profile with height: 0 none, 0.14 open country."),
 ]
 GustOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; repeat it."
+        "--gust", metavar="M/S@S", help="4@12s, 4@12s/3s (3 s long), 4@12s:up, :down, :across or :90; may be repeated."
     ),
 ]
 TurbulenceOption = Annotated[
@@ -71,20 +75,26 @@ AutopilotOption = Annotated[
 GpsRateOption = Annotated[
     float | None,
     typer.Option(
-        "--gps-rate", metavar="HZ", help="Reports of the GPS, instead of the receiver's own.",
+        "--gps-rate", metavar="HZ", help="Rate of the GPS, instead of the receiver's own.",
         parser=number_in(-1e6, 1e6, "Hz"),
     ),
 ]  # fmt: skip
 ImuRateOption = Annotated[
     int | None,
     typer.Option(
-        "--imu-rate", metavar="HZ", help="Gyro, accelerometer and the loop.", parser=whole_in(-1000000, 1000000, "Hz")
+        "--imu-rate",
+        metavar="HZ",
+        help="Rate of gyro, accelerometer and the loop.",
+        parser=whole_in(-1000000, 1000000, "Hz"),
     ),
 ]
 SensorsOption = Annotated[
     str | None,
     typer.Option(
-        "--sensors", metavar="NAME", help="Sensor suite, or suite.toml of your own.", autocompletion=complete.suites
+        "--sensors",
+        metavar="NAME",
+        help="Name of a sensor suite, or the path of your own suite.toml.",
+        autocompletion=complete.suites,
     ),
 ]
 FaultOption = Annotated[
@@ -93,36 +103,42 @@ FaultOption = Annotated[
         "--fault",
         metavar="FAULT",
         help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
-        "east); repeat it. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, nan, "
-        "spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Where no value is given: "
+        "east); may be repeated. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, "
+        "nan, spikes, bias, gain, saturated. gps: outage, jump, frozen_course, stuck, nan, spikes. Default values: "
         "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
         "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0.",
     ),
 ]
 JsonOption = Annotated[
-    str | None, typer.Option("--json", metavar="FILE", help="Write the numbers as JSON; - is standard output.")
+    str | None, typer.Option("--json", metavar="FILE", help="Write the results as JSON; - is standard output.")
 ]
-WebOption = Annotated[bool, typer.Option("--web", help="The viewer in a browser instead of a window.")]
+WebOption = Annotated[bool, typer.Option("--web", help="Use the viewer in a browser.")]
 WorkersOption = Annotated[
     int | None,
-    typer.Option(metavar="N", help="Processes; as many as processors by default.", parser=whole_in(1, MOST_WORKERS)),
+    typer.Option(
+        metavar="N", help="Number of processes. [default: as many as processors]", parser=whole_in(1, MOST_WORKERS)
+    ),
 ]
 FlightTimeoutOption = Annotated[
     float | None,
     typer.Option(
         "--flight-timeout",
         metavar="S",
-        help="Wall-clock limit of each flight. [default: 600]",
+        help="Wall-clock limit per flight. [default: 600]",
         parser=number_in(0.001, 1e6, "s"),
     ),
 ]
-PictureOption = Annotated[Path | None, typer.Option("--picture", metavar="FILE", help="Draw it, as PNG, SVG or PDF.")]
-NoRerunOption = Annotated[bool, typer.Option("--no-rerun", help="Record Parquet alone.")]
+PictureOption = Annotated[
+    Path | None, typer.Option("--picture", metavar="FILE", help="Draw a picture: PNG, SVG or PDF.")
+]
+NoRerunOption = Annotated[bool, typer.Option("--no-rerun", help="Record Parquet only.")]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the recordings.")]
 SeedsOption = Annotated[str, typer.Option("--seeds", metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")]
 LedgerOption = Annotated[
     Path | None,
-    typer.Option("--ledger", metavar="FOLDER", help="Keep each verdict there as it comes, and fly what is missing."),
+    typer.Option(
+        "--ledger", metavar="FOLDER", help="Keep finished flights in this folder, and fly only what is missing."
+    ),
 ]
 FLIGHT_TIMEOUT_S = 600.0
 PageOption = Annotated[
@@ -138,29 +154,28 @@ CalibrationOption = Annotated[
     float | None,
     typer.Option(
         metavar="S",
-        help="At the start, averaged for the power-up if at rest; 0 is none. [default: 2]",
+        help="Seconds averaged at the start for the power-up, if at rest; 0 is none. [default: 2]",
         parser=number_in(-1e6, 1e6, "s"),
     ),
 ]
 ColumnsOption = Annotated[str | None, typer.Option(metavar="MAP", help="Column map: a .toml file, or umn_ultrastick.")]
-ReferenceOption = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Attitudes to score against, where the log holds none.")
-]
+ReferenceOption = Annotated[Path | None, typer.Option(metavar="FILE", help="File with the attitudes to score against.")]
 UnitOption = Annotated[
     int | None,
     typer.Option(
-        "--imu", metavar="N", help="Inertial unit of a .bin or .ulg that has several, from 0.", parser=whole_in(0, 99)
+        "--imu", metavar="N", help="Inertial unit to read from a .bin or .ulg, from 0.", parser=whole_in(0, 99)
     ),
 ]
 SeveralOption = Annotated[
     str | None,
     typer.Option(
-        "--estimators", metavar="A,B,C", help="What flies it; all there are by default.",
+        "--estimators", metavar="A,B,C", help="Estimators to compare. [default: all]",
         autocompletion=complete.estimators,
     ),
 ]  # fmt: skip
 ParameterOption = Annotated[
-    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A parameter of the estimators.")
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="A parameter: k_p=1, or my_filter.k_p=1."),
 ]
 LogEstimatorsOption = Annotated[
     str,
@@ -176,7 +191,7 @@ WithholdOption = Annotated[
     typer.Option(
         "--withhold",
         metavar="NAME,...",
-        help="Properties of the instruments that nobody is given; all for all of them.",
+        help="Properties of the instruments to hide from estimators and autopilots; all hides all.",
     ),
 ]
 
@@ -198,7 +213,7 @@ def flight_options(
     set_: SetOption = None,
     withhold: WithholdOption = None,
 ) -> dict[str, Any]:
-    """The options of every command that flies, as changes of the configuration by dotted names."""
+    """The options of every command that flies, as configuration changes by dotted name."""
     named = {
         "aircraft": aircraft,
         "autopilot": autopilot,
@@ -217,7 +232,7 @@ def flight_options(
 
 
 def flies(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the `flight_options` in place of its parameter ``changes``, which is handed a `Changes`."""
+    """Give a command the `flight_options` in place of its parameter ``changes``, which receives a `Changes`."""
     own, shared = inspect.signature(command), inspect.signature(flight_options)
     parameters = [
         each
@@ -236,12 +251,12 @@ def flies(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def time_limit(flight_timeout: float | None, *, live: bool = False) -> float | None:
-    """The value of ``--flight-timeout``; by default none for a flight that is watched as it is flown."""
+    """The value of ``--flight-timeout``; by default there is none with ``--live``."""
     return flight_timeout if flight_timeout is not None or live else FLIGHT_TIMEOUT_S
 
 
 def changes_of(assignments: list[str] | None) -> dict[str, Any]:
-    """Overrides of ``--set name=value``."""
+    """Changes from ``--set name=value``."""
     changes = {}
     for text in assignments or []:
         name, equals, value = text.partition("=")
@@ -252,12 +267,12 @@ def changes_of(assignments: list[str] | None) -> dict[str, Any]:
 
 
 def given(named: dict[str, Any]) -> dict[str, Any]:
-    """Those of `named` that were given on the command line."""
+    """The entries of `named` that were given on the command line."""
     return {name: value for name, value in named.items() if value is not None}
 
 
 def names_of(text: str | None, option: str) -> list[str]:
-    """Names of a list with commas, none if the option was not given; refused if one of them is empty."""
+    """The names in a comma-separated list, none if the option was not given; an empty name is an error."""
     names = [name.strip() for name in text.split(",")] if text is not None else []
     if not all(names):
         raise refusal(f"{option} {brief(text)}: an empty name; write names with commas between them")

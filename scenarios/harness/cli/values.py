@@ -1,4 +1,4 @@
-"""What an option's text is turned into, or refused with; and what a shell completes it to."""
+"""Parsers for the values of options, and completion of names by the shell."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -11,18 +11,18 @@ from sim.outside.wording import brief
 
 
 def number_in(least: float, most: float, unit: str) -> Callable[[Any], float]:
-    """What reads a finite number from `least` to `most`; a default is taken as it is."""
+    """A parser for finite numbers from `least` to `most`; defaults pass unchanged."""
     return _reader(number, least, most, unit)
 
 
 def whole_in(least: int, most: int, unit: str = "") -> Callable[[Any], int]:
-    """What reads a whole number from `least` to `most`; a default is taken as it is."""
+    """A parser for whole numbers from `least` to `most`; defaults pass unchanged."""
     return _reader(whole, least, most, unit)
 
 
 def _reader(read: Callable[[str], Any], least: float, most: float, unit: str) -> Callable[[Any], Any]:
     def parse(text: Any) -> Any:
-        from pydantic_core import PydanticCustomError  # typer says of it what the message says, and no more
+        from pydantic_core import PydanticCustomError  # typer prints its message and nothing else
 
         if not isinstance(text, str):
             return text
@@ -39,11 +39,11 @@ def _reader(read: Callable[[str], Any], least: float, most: float, unit: str) ->
 
 
 class Commands(TyperGroup):
-    """The commands; ``--quiet`` is understood before and after their names, and nothing is empty."""
+    """The commands; ``--quiet`` may come before or after their names, and empty arguments are errors."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As typer does, after what holds for all arguments alike."""
-        if not ctx.resilient_parsing:  # as where a shell wants to complete half a line
+        """As typer does, after the checks common to all arguments."""
+        if not ctx.resilient_parsing:  # completion by the shell
             _refuse_empty(args)
         end = args.index("--") if "--" in args else len(args)
         others = [text for text in args[:end] if text not in _QUIET]
@@ -62,36 +62,36 @@ def _refuse_empty(args: list[str]) -> None:
             before = args[i - 1] if i and args[i - 1].startswith("-") else f"argument {i + 1}"
             raise refusal(f"{name if equals else before}: the text is empty; write a value, or leave it out")
         if "\0" in text:
-            raise refusal(f"argument {brief(text)}: holds a NUL character, which no name can")
+            raise refusal(f"argument {brief(text)}: contains a NUL character")
 
 
 def scenarios(incomplete: str) -> Sequence[str]:
-    """Names of scenarios that begin so."""
+    """Scenarios whose names begin with `incomplete`."""
     return _beginning(incomplete, "scenarios")
 
 
 def estimators(incomplete: str) -> Sequence[str]:
-    """Names of estimators that begin so; of a list with commas its last one."""
+    """Estimators whose names begin with `incomplete`; in a comma-separated list, with its last name."""
     return _beginning(incomplete, "estimators")
 
 
 def autopilots(incomplete: str) -> Sequence[str]:
-    """Names of autopilots that begin so."""
+    """Autopilots whose names begin with `incomplete`."""
     return _beginning(incomplete, "autopilots")
 
 
 def aircraft(incomplete: str) -> Sequence[str]:
-    """Names of aircraft that begin so."""
+    """Aircraft whose names begin with `incomplete`."""
     return _beginning(incomplete, "aircraft")
 
 
 def suites(incomplete: str) -> Sequence[str]:
-    """Names of sensor suites that begin so."""
+    """Sensor suites whose names begin with `incomplete`."""
     return _beginning(incomplete, "suites")
 
 
 def suites_and_parts(incomplete: str) -> Sequence[str]:
-    """Names of sensor suites and of parts that begin so."""
+    """Sensor suites and parts whose names begin with `incomplete`."""
     return [*suites(incomplete), *_beginning(incomplete, "parts")]
 
 
@@ -106,7 +106,7 @@ def claims(incomplete: str) -> Sequence[str]:
 
 
 def kinds(incomplete: str) -> Sequence[str]:
-    """Kinds of things that have names, which begin so."""
+    """Kinds of named things that begin with `incomplete`."""
     from scenarios.harness.commands.catalogue import KINDS
 
     return [kind for kind in KINDS if kind.startswith(incomplete)]

@@ -23,6 +23,7 @@ from scenarios.harness.gate.sources import decided_by, fingerprint
 from scenarios.harness.gate.workers import fly_each, processors
 from scenarios.harness.registry import find, matching
 from scenarios.harness.seeds import parse_seeds
+from scenarios.harness.settings import without_others
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim import recording
 from sim.log import Outcome
@@ -81,9 +82,13 @@ def tasks(
             f"{len(wanted)} scenarios on {len(seeds)} seeds: at most {MOST_FLIGHTS} flights at once; split them"
         )
     all_changes = changes if estimator is None else {**changes, "estimator": estimator}
-    all_prepared = [prepare(name, all_changes) for name in wanted]  # all of them, before anything is said
+    flies = {name: str(all_changes.get("estimator", find(name).config.estimator)) for name in wanted}
+    of_each = {name: without_others(changes, flies[name], list(flies.values())) for name in wanted}
+    # All of them are prepared before anything is said.
+    all_prepared = [prepare(name, of_each[name], estimator=estimator) for name in wanted]
     found = []
     for name, prepared in zip(wanted, all_prepared, strict=True):
+        changes = of_each[name]
         console.warn_of_faults(name, prepared.config)
         note_ignored(name, prepared.config)
         decides = decided_by(name, prepared) | {"changes": recording.plain(changes)} if keyed else {}

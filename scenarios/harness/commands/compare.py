@@ -31,7 +31,7 @@ from scenarios.harness.commands.comparison import (
     print_report,
 )
 from scenarios.harness.commands.listing import note_ignored
-from scenarios.harness.config import FlightConfig
+from scenarios.harness.config import FlightConfig, is_field
 from scenarios.harness.flight import Prepared, fly_scenario, prepare_config
 from scenarios.harness.flight import prepare as prepare_flight
 from scenarios.harness.gate import guard
@@ -41,19 +41,17 @@ from scenarios.harness.metrics import heading_error_deg, inclination_error_deg
 from scenarios.harness.plugins import (
     PluginError,
     load_estimator,
-    shared_settings,
     uses_of,
-    without,
 )
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.seeds import parse_seeds
+from scenarios.harness.settings import PREFIX, lines_on_others, shared_settings, split
 from scenarios.harness.timing import Cost, NotTimed, cost
 from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Outcome
 
 TIMED_S = 4.0
-PREFIX = "estimator_params."
 _UNKNOWN = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")  # of a class that does not say
 
 
@@ -108,10 +106,9 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     for name, instead in (("estimator", "--estimators"), ("seed", "--seeds")):
         if name in changes:
             raise ValueError(f"--set {name}={changes[name]}: name what is to be flown with {instead}")
-    find(scenario)  # before anything is constructed, which may mean compiling for a while
+    flown = find(scenario).config  # before anything is constructed, which may mean compiling for a while
     names = tuple(dict.fromkeys(estimators)) or tuple(name for name in ESTIMATORS if _can_be_loaded(name))
-    settings = {key.removeprefix(PREFIX): value for key, value in changes.items() if key.startswith(PREFIX)}
-    shared = {key: value for key, value in changes.items() if not key.startswith(PREFIX)}
+    shared, settings = split(changes, names, lambda name: is_field(name, flown, changes))
     of_each = shared_settings(names, settings)
     changes_of = {name: shared | {PREFIX + key: value for key, value in of_each[name].items()} for name in names}
     prepared = {name: prepare_flight(scenario, {**changes_of[name], "estimator": name}, lenient=True) for name in names}
@@ -121,7 +118,7 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
         note_ignored(scenario, of_it.config)
     references = {name: of_it.heading_reference for name, of_it in prepared.items()}
     instruments = {name: given(of_it) for name, of_it in prepared.items()}
-    notes = (*without(of_each, settings), *_unheard(prepared))
+    notes = (*lines_on_others(of_each, settings), *_unheard(prepared))
     return Plan(scenario, first.scenario, first.config, names, tuple(seeds), changes_of, notes, references, instruments)
 
 

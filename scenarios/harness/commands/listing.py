@@ -5,19 +5,22 @@ hides no other.
 """
 
 import inspect
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
 from typing import TYPE_CHECKING, Any
 
+from scenarios.harness import plugins
 from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.commands.catalogue import KINDS, ours
 from scenarios.harness.gate import guard
+from scenarios.harness.parameters import Parameter, default_text, estimator_parameters
+from scenarios.harness.settings import names_of
 from sim.outside.entry_points import OURS, Offer, ignored, offered
 from sim.outside.signals import TimedOut, limited
 from sim.outside.wording import printable
-from sim.params import dotted_fields, near_misses, unit_of
+from sim.params import near_misses
 
 if TYPE_CHECKING:
     from scenarios.harness.config import FlightConfig
@@ -98,9 +101,7 @@ def _loaded(offer: Offer) -> Listed:
 
 
 def _about_code(offer: Offer) -> str:
-    from scenarios.harness.plugins import load_class
-
-    maker = load_class(offer.kind[:-1], offer.name)
+    maker = plugins.load_class(offer.kind[:-1], offer.name)
     text = inspect.getdoc(maker) if inspect.isclass(maker) or inspect.isfunction(maker) else None
     return (text or offer.value).partition("\n")[0]
 
@@ -123,23 +124,21 @@ _ABOUT = {
 }  # fmt: skip
 
 
-def parameters(kind: str | None, specs: Sequence[str]) -> dict[str, dict[str, dict[str, Any]]]:
-    """What can be set of estimators: estimator -> parameter -> default, unit, meaning.
+def parameters(kind: str | None, specs: Sequence[str]) -> dict[str, list[Parameter]]:
+    """The parameters of estimators, for ``--set``.
 
-    specs : names, ``module:Class`` or ``file.py:Class``; every estimator that can be loaded, where none is named
+    specs : names, ``module:Class`` or ``file.py:Class``; every estimator that can be loaded, if none is named
 
     Raises
     ------
     ValueError      one line: a kind that has no parameters, no such estimator
     """
     if kind not in (None, "estimators"):
-        raise ValueError(f"list {kind} --params: only estimators have parameters")
-    from scenarios.harness import plugins
-
+        raise ValueError(f"list {printable(kind)} --params: only estimators have parameters")
     found = {}
     for spec in specs or sorted(plugins.estimators()):
         try:
-            found[spec] = _parameters(spec)
+            found[spec] = estimator_parameters(spec)
         except plugins.PluginError as problem:
             if specs:
                 raise
@@ -147,21 +146,37 @@ def parameters(kind: str | None, specs: Sequence[str]) -> dict[str, dict[str, di
     return found
 
 
-def _parameters(spec: str) -> dict[str, dict[str, Any]]:
-    from scenarios.harness import plugins
+def parameters_json(found: Mapping[str, Sequence[Parameter]]) -> dict[str, Any]:
+    """Plain data: estimator -> parameter -> default, unit, meaning, raised, lowered."""
 
-    params = plugins.params_of(spec, plugins.load_estimator(spec))
-    return {
-        name: {"default": reduce(getattr, name.split("."), params), "unit": unit_of(name)}
-        for name in (dotted_fields(params) if params is not None else ())
-    }
+    def about(parameter: Parameter) -> dict[str, Any]:
+        plain = parameter._asdict()
+        name, default = plain.pop("name"), plain.pop("default")
+        known = default is None or isinstance(default, bool | int | str)
+        finite = isinstance(default, float) and math.isfinite(default)
+        return {"set": name, "default": default if known or finite else default_text(default), **plain}
+
+    return {spec: {entry.pop("set"): entry for entry in map(about, parameters)} for spec, parameters in found.items()}
 
 
-def print_parameters(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
-    """A table for each estimator."""
-    for estimator, params in found.items():
-        rows = [[name, str(about["default"]), about["unit"]] for name, about in params.items()]
-        console.out().print(console.table(estimator, ("", "default", "unit"), rows, text=(0, 2)))
+def print_parameters(found: Mapping[str, Sequence[Parameter]]) -> None:
+    """A table for each estimator: name, default and unit, then what it is and what a change does."""
+    for spec, params in found.items():
+        rows = [[p.name, f"{default_text(p.default)} {_unit(p.unit)}".strip(), _text(p)] for p in params]
+        title = f"{spec}: --set {names_of(spec)[0]}.NAME=VALUE"
+        rows = rows or [["no parameters", "", ""]]
+        table = console.table(title, ("", "", ""), rows, text=(0, 1, 2), wrapping=(1, 2))
+        console.out().print(table)
+
+
+def _unit(unit: str) -> str:
+    return "" if unit in ("-", "switch", "choice") else unit
+
+
+def _text(parameter: Parameter) -> str:
+    up, down = ("on", "off") if parameter.unit == "switch" else ("higher", "lower")
+    effects = {up: parameter.raised, down: parameter.lowered}
+    return "; ".join([parameter.meaning, *(f"{way}: {text}" for way, text in effects.items() if text)]).strip("; ")
 
 
 _noted: set[tuple[str, str]] = set()
@@ -169,14 +184,13 @@ _noted: set[tuple[str, str]] = set()
 
 def note_ignored(scenario: str, config: "FlightConfig") -> None:
     """Say, once each, which entry points have the name of something of wingslevel that flies, and are ignored."""
-    from scenarios.harness.plugins import OURS as FLIGHT_CODE
     from scenarios.harness.registry import registered
     from sim.sensors.fitting import SUITES
 
     for kind, known, name in (
         ("scenarios", registered(), scenario),
-        ("estimators", FLIGHT_CODE["estimators"], config.estimator),
-        ("autopilots", FLIGHT_CODE["autopilots"], config.autopilot),
+        ("estimators", plugins.OURS["estimators"], config.estimator),
+        ("autopilots", plugins.OURS["autopilots"], config.autopilot),
         ("suites", SUITES, config.suite),
     ):
         if (kind, name) not in _noted:
@@ -203,7 +217,7 @@ def run(kind: str | None, names: Sequence[str], *, params: bool, json_: str | No
         if params:
             with usage():
                 about = parameters(kind, names)
-            report({"estimators": about})
+            report({"estimators": parameters_json(about)})
             print_parameters(about)
             return
         with usage():

@@ -13,9 +13,10 @@ from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.gate import guard
 from scenarios.harness.logs.recorded import RecordedLog
-from scenarios.harness.plugins import shared_settings, short_name, without
+from scenarios.harness.plugins import short_name
 from scenarios.harness.recorder import record
 from scenarios.harness.replay import Replayed, Window, as_flight, gone, judged_rows, known_to, make, replay, why_none
+from scenarios.harness.settings import PREFIX, lines_on_others, shared_settings
 from sim import recording
 from sim.log import Flight
 from sim.outside.wording import file_name
@@ -100,7 +101,7 @@ def replay_log(
     window, params = window or Window(), params or {}
     if not names or len({short_name(name) for name in names}) < len(names):
         raise ValueError(f"--estimator {','.join(names)}: name one or more, each only once")
-    settings = {name.removeprefix("estimator_params.").removeprefix("instruments."): v for name, v in params.items()}
+    settings = {name.removeprefix(PREFIX).removeprefix("instruments."): v for name, v in params.items()}
     of_each, withheld = shared_settings(names, settings), property_names(withheld)
     for name in names:
         make(name, of_each[name])
@@ -121,7 +122,7 @@ def replay_log(
     folders = {r.estimator: _recorded(flights.get(r.estimator), log, r.estimator, into, rerun) for r in replays}
     first = replays[0].first
     judged_s = float(np.sum(log.rows["dt_s"][judged_rows(log, window, first)]))
-    notes = (*without(of_each, settings), *_ground_too(log))
+    notes = (*lines_on_others(of_each, settings), *_ground_too(log))
     return Replays(log, judged_s, tuple(replays), folders, flights, why_none(log, window, first), notes)
 
 

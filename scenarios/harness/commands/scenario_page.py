@@ -207,7 +207,8 @@ def _section(family: Sequence[Scenario], numbers: Numbers) -> list[str]:
     lines = [f"## {first.name}", "", f"*{markdown(first.summary)}*", ""]
     lines += [line for label in ("Story", "Verifies") for line in (f"**{label}.** {_sentence(table.pop(label))}", "")]
     lines += [f"| {' | '.join(facts)} |", "|" + "-|" * len(facts), f"| {' | '.join(facts.values())} |", ""]
-    lines += [line for label, text in table.items() for line in (f"**{label}** {_sentence(text)}", "")]
+    for label, text in table.items():  # "Passes when" begins a sentence
+        lines += [f"**{label}{'' if label == 'Passes when' else '.'}** {_sentence(text)}", ""]
     lines += [line for text in after for line in (text, "")]
     for scenario in family:
         if variants:

@@ -17,13 +17,15 @@ from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios fin
 from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
 from scenarios.harness.config.validation import validated
+from scenarios.harness.plugins import Maker
 from scenarios.harness.seeds import LARGEST_SEED
+from scenarios.harness.settings import parameter_name
 from sim.clock import Rates
 from sim.log import FLOWN_DTYPE, TRUTH_DTYPE
 from sim.outside.numbers import RIGHT, is_odd, number
-from sim.outside.wording import brief, printable
+from sim.outside.wording import printable
 from sim.params import changed as change_params
-from sim.params import dotted_fields, near_misses, require_fitted, shown, unit_of
+from sim.params import dotted_fields, require_fitted, shown, unit_of
 from sim.rng import stream
 from sim.sensors.fitting import SuiteParams, own_files, suite_params
 
@@ -236,7 +238,8 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
     """`config` with fields changed by their dotted names; values may be text, as from a command line.
 
     ``wind`` takes what `parse_wind` takes; ``gps.``, ``gyro.`` and ``accelerometer.`` are short for ``sensors.gps.``
-    and so on, and the name of a property of the instruments for ``instruments.`` and that name.
+    and so on, and the name of a property of the instruments for ``instruments.`` and that name.  Parameters of the
+    estimator are spelled as `scenarios.harness.settings` says.
 
     Raises
     ------
@@ -245,19 +248,22 @@ def override(config: FlightConfig, overrides: Mapping[str, Any]) -> FlightConfig
     return overridden(config, overrides)[0]
 
 
-def overridden(config: FlightConfig, overrides: Mapping[str, Any]) -> tuple[FlightConfig, SuiteParams]:
-    """The result of `override`, and the figures of its suite."""
+def overridden(
+    config: FlightConfig, overrides: Mapping[str, Any], maker: Maker | None = None
+) -> tuple[FlightConfig, SuiteParams]:
+    """The result of `override`, and the figures of its suite; `maker` makes the estimator, where it is given."""
     data = config.model_dump()
     if "suite" in overrides:  # first, for its fields are named by other overrides; its files are read anew
         data |= {"suite": str(overrides["suite"]), "files": {}}
         config = config.model_copy(update={"suite": data["suite"], "files": {}})
     unchanged = suite_params(config.suite, {}, config.files)
+    estimator = maker or str(overrides.get("estimator", config.estimator))
     for name, value in overrides.items():
         if name == "wind":
             wind = parse_wind(str(value))
             data["air"] |= {"wind_m_s": wind.m_s, "wind_from_deg": wind.from_deg}
         else:
-            full_name = _full_name(name, config, unchanged)
+            full_name = _field(name, config, unchanged) or _parameter(name, config, unchanged, estimator)
             _refuse_odd(full_name, value)
             _put(data, full_name, value)
     changed = validated(FlightConfig, data)
@@ -276,20 +282,32 @@ def fitted_suite(config: FlightConfig) -> SuiteParams:
 _TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts")
 
 
-def _full_name(name: str, config: FlightConfig, fitted: SuiteParams) -> str:
-    """Full dotted name of a field, or a ValueError with suggestions; `fitted` is the suite."""
-    fields = dotted_fields(fitted)
-    if name in fields:
+def is_field(name: str, config: FlightConfig, overrides: Mapping[str, Any]) -> bool:
+    """Whether a name that `override` takes is a field of the configuration, and no parameter of the estimator."""
+    changed = {"suite": str(overrides["suite"]), "files": {}} if "suite" in overrides else {}
+    config = config.model_copy(update=changed)
+    return name == "wind" or bool(_field(name, config, suite_params(config.suite, {}, config.files)))
+
+
+def _field(name: str, config: FlightConfig, fitted: SuiteParams) -> str:
+    """Dotted name of a field that exists, empty where there is none; `fitted` is its suite."""
+    if name in dotted_fields(fitted):
         return f"sensors.{name}"
     if name in PROPERTIES:
         return f"instruments.{name}"
-    open_ended = name.startswith("estimator_params.")  # the estimator's own dataclass checks these
+    # The estimator's own dataclass checks the names of its parameters.
+    return name if name.startswith("estimator_params.") or name in _known(config, fitted) else ""
+
+
+def _parameter(name: str, config: FlightConfig, fitted: SuiteParams, estimator: str | Maker) -> str:
+    """Dotted name of a parameter of the estimator, or a ValueError with the names that come near."""
+    require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
+    return parameter_name(name, estimator, [*_known(config, fitted), *dotted_fields(fitted)])
+
+
+def _known(config: FlightConfig, fitted: SuiteParams) -> list[str]:
     properties = [f"instruments.{property_}" for property_ in PROPERTIES]
-    known = [*_dotted(config), *properties, *(f"sensors.{f}" for f in fields), "wind"]
-    if name not in known and not open_ended:
-        require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
-        raise ValueError(f"unknown parameter {brief(name)}: {near_misses(name, [*known, *fields])}")
-    return name
+    return [*_dotted(config), *properties, *(f"sensors.{f}" for f in dotted_fields(fitted)), "wind"]
 
 
 def _dotted(config: FlightConfig) -> list[str]:

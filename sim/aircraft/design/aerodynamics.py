@@ -75,34 +75,41 @@ def _slipstream(d: Design) -> list[str]:
 
 def aerodynamics(d: Design) -> str:
     """Forces in wind axes, moments in body axes."""
-    a, s = d.attached, d.surfaces
-    alpha = np.radians(ALPHA_DEG)
-    cl, cd, cm = d.polars.lift_drag_pitch(alpha)
-    elevator = np.radians(d.shape.elevator_throw_deg) * s.effectiveness
-    rudder = np.radians(d.shape.rudder_throw_deg) * s.effectiveness
-    area, span, chord = "metrics/Sw-sqft", "metrics/bw-ft", "metrics/cbarw-ft"
-    force = ("aero/qbar-psf", area)
-    tail_q, fin_q = ("aero/tail-qbar-psf", "aero/fin-qbar-psf") if d.drive else ("aero/qbar-psf", "aero/qbar-psf")
-    roll, pitch = (*force, span), (*force, chord)
-    p, q, r = (f"aero/{x}-rad_sec" for x in "pqr")
-    b2v, c2v, side, cos_a = "aero/bi2vel", "aero/ci2vel", "aero/sin-beta", "aero/cos-alpha"
-    rolling = d.polars.rolling(np.radians(ROLLING_DEG), HELIX)
-    roll_p, yaw_p = (table_2d("aero/alpha-deg", ROLLING_DEG, "aero/helix", HELIX, v) for v in rolling)
+    return "<aerodynamics>\n" + "\n".join([*_common(d), *_forces(d), *_moments(d)]) + "\n</aerodynamics>"
 
-    def over_alpha(values: Array) -> str:
-        return table("aero/alpha-deg", ALPHA_DEG, values)
 
-    blocks = [
-        *_common(d),
+def _over_alpha(values: Array) -> str:
+    return table("aero/alpha-deg", ALPHA_DEG, values)
+
+
+def _tail_pressures(d: Design) -> tuple[str, str]:
+    """Properties with the dynamic pressure at tailplane and fin."""
+    return ("aero/tail-qbar-psf", "aero/fin-qbar-psf") if d.drive else ("aero/qbar-psf", "aero/qbar-psf")
+
+
+def _full_deflections(d: Design) -> tuple[float, float]:
+    """Effective full deflections of elevator and rudder, rad."""
+    throws = np.radians([d.shape.elevator_throw_deg, d.shape.rudder_throw_deg]) * d.surfaces.effectiveness
+    return float(throws[0]), float(throws[1])
+
+
+def _forces(d: Design) -> list[str]:
+    a = d.attached
+    cl, cd, _ = d.polars.lift_drag_pitch(np.radians(ALPHA_DEG))
+    elevator, rudder = _full_deflections(d)
+    tail_q, fin_q = _tail_pressures(d)
+    area, b2v, side, cos_a = "metrics/Sw-sqft", "aero/bi2vel", "aero/sin-beta", "aero/cos-alpha"
+    force, (p, q, r) = ("aero/qbar-psf", area), (f"aero/{x}-rad_sec" for x in "pqr")
+    return [
         axis(
             "LIFT",
-            product("aero/force/lift-alpha", *force, "aero/cos2-beta", over_alpha(cl)),
-            product("aero/force/lift-q", *force, c2v, q, a.cl_q),
+            product("aero/force/lift-alpha", *force, "aero/cos2-beta", _over_alpha(cl)),
+            product("aero/force/lift-q", *force, "aero/ci2vel", q, a.cl_q),
             product("aero/force/lift-elevator", tail_q, area, cos_a, "servo/elevator", a.cl_elevator * elevator),
         ),
         axis(
             "DRAG",
-            product("aero/force/drag-alpha", *force, "aero/cos2-beta", over_alpha(cd)),
+            product("aero/force/drag-alpha", *force, "aero/cos2-beta", _over_alpha(cd)),
             product("aero/force/drag-beta", *force, side, side, -a.cy_beta, about="the side force, along the wind"),
             *_stopped_propeller(d),
         ),
@@ -115,18 +122,34 @@ def aerodynamics(d: Design) -> str:
             product("aero/force/side-r", *force, b2v, r, a.cy_r, about="the fin's, balances the rudder's in a turn"),
             product("aero/force/side-rudder", fin_q, area, cos_a, "servo/rudder", a.cy_rudder * rudder),
         ),
+    ]
+
+
+def _moments(d: Design) -> list[str]:
+    a, alpha = d.attached, np.radians(ALPHA_DEG)
+    _, _, cm = d.polars.lift_drag_pitch(alpha)
+    elevator, rudder = _full_deflections(d)
+    tail_q, fin_q = _tail_pressures(d)
+    area, span, chord = "metrics/Sw-sqft", "metrics/bw-ft", "metrics/cbarw-ft"
+    roll, pitch, (p, q, r) = (
+        ("aero/qbar-psf", area, span), ("aero/qbar-psf", area, chord), (f"aero/{x}-rad_sec" for x in "pqr")
+    )  # fmt: skip
+    b2v, side, cos_a = "aero/bi2vel", "aero/sin-beta", "aero/cos-alpha"
+    rolling = d.polars.rolling(np.radians(ROLLING_DEG), HELIX)
+    roll_p, yaw_p = (table_2d("aero/alpha-deg", ROLLING_DEG, "aero/helix", HELIX, v) for v in rolling)
+    return [
         axis(
             "ROLL",
             product("aero/moment/roll-beta", *roll, side, "aero/dihedral-shape", a.roll_beta),
             product("aero/moment/roll-p", *roll, b2v, p, roll_p, about="autorotation past the stall"),
-            product("aero/moment/roll-r", *roll, b2v, r, over_alpha(d.polars.roll_of_yawing(alpha))),
+            product("aero/moment/roll-r", *roll, b2v, r, _over_alpha(d.polars.roll_of_yawing(alpha))),
             product("aero/moment/roll-rudder", fin_q, area, span, cos_a, "servo/rudder", a.roll_rudder * rudder),
             *_ailerons(d, "roll", a.roll_aileron),
         ),
         axis(
             "PITCH",
-            product("aero/moment/pitch-alpha", *pitch, "aero/cos2-beta", over_alpha(cm)),
-            product("aero/moment/pitch-q", *pitch, c2v, q, a.cm_q),
+            product("aero/moment/pitch-alpha", *pitch, "aero/cos2-beta", _over_alpha(cm)),
+            product("aero/moment/pitch-q", *pitch, "aero/ci2vel", q, a.cm_q),
             product(
                 "aero/moment/pitch-elevator", tail_q, area, chord, cos_a, "servo/elevator", a.cm_elevator * elevator
             ),
@@ -142,7 +165,6 @@ def aerodynamics(d: Design) -> str:
             *_washed_yaw(d),
         ),
     ]
-    return "<aerodynamics>\n" + "\n".join(blocks) + "\n</aerodynamics>"
 
 
 def _ailerons(d: Design, name: str, slope: float) -> list[str]:
