@@ -61,7 +61,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class GyroOnly(Compiled[None]):
-    """Eqns 16-21 without drift correction: gyros from power-up on, less the offset measured there."""
+    """Gyros alone, less the offset measured at power-up (Eqns 16-21): a baseline."""
 
     heading_reference = "nose"
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro",)
@@ -73,7 +73,7 @@ class GyroOnly(Compiled[None]):
 
 
 class AccelerometerOnly(GyroOnly):
-    """Tilt from the accelerometer alone at every sample, heading from the gyros."""
+    """Tilt from the accelerometer alone, heading from the gyros: a baseline."""
 
     uses = ("gyro", "accelerometer")
     _tilt_from_force = True

@@ -144,7 +144,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Complementary(Compiled[ComplementaryParams]):
-    """The filter as the loop calls it; `Compiled` has ``reset``, ``update``, ``replay`` and the counters."""
+    """Complementary filter on the rotation matrix: the example to copy for your own."""
 
     heading_reference = "course"
     uses = ("gyro", "accelerometer", "gps")

@@ -219,7 +219,7 @@ def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
 
 
 class Dilshad(Compiled[DilshadParams]):
-    """Dilshad and Jahan (2014): yaw by the magnetometer, no centrifugal term; see the module.
+    """Dilshad and Jahan (2014): yaw from the magnetometer, no centrifugal term; for multi-rotors.
 
     The first field sets the heading.
     """

@@ -282,7 +282,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class GpsVelocity(Compiled[GpsVelocityParams]):
-    """Premerlani's note of 2011: roll and pitch from the change of GPS velocity; see the module."""
+    """Premerlani (2011): roll and pitch from the change of GPS velocity, yaw from the course."""
 
     heading_reference: HeadingReference = "course"  # "nose" with another `yaw_reference`
     _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
@@ -301,13 +301,13 @@ class GpsVelocity(Compiled[GpsVelocityParams]):
 
 
 class GpsVelocityNose(GpsVelocity):
-    """`GpsVelocity` whose heading is the nose's: the wind is learnt in turns and subtracted from the GPS velocity."""
+    """gps_velocity with the nose as heading: wind learnt in turns is subtracted from the GPS velocity."""
 
     _default = GPS_VELOCITY_NOSE
 
 
 class GpsVelocityMagnetometer(GpsVelocity):
-    """`GpsVelocity` whose heading is the nose's, from the magnetometer."""
+    """gps_velocity with the heading from the magnetometer."""
 
     uses = ("gyro", "accelerometer", "gps", "magnetometer")
     _default = GPS_VELOCITY_MAGNETOMETER

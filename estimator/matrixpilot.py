@@ -368,7 +368,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class MatrixPilot(Compiled[MatrixPilotParams]):
-    """MatrixPilot's present form of Premerlani and Bizard: turns need no GPS; see the module."""
+    """MatrixPilot since 2017: Premerlani and Bizard with a centrifugal term that needs no GPS."""
 
     heading_reference = "nose"
     _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE

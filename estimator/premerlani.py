@@ -269,7 +269,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Premerlani(Compiled[PremerlaniParams]):
-    """Premerlani and Bizard (2009): gyros, centrifugal term, yaw by the GPS course; see the module."""
+    """Premerlani and Bizard (2009): gyros, centrifugal term, yaw from the GPS course."""
 
     heading_reference: HeadingReference = "course"  # "nose" with `learn_wind`
     uses = ("gyro", "accelerometer", "gps", "airspeed")

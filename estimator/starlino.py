@@ -182,7 +182,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Starlino(Compiled[StarlinoParams]):
-    """Starlino's weighted mean of small rotations, in both its forms; see the module.
+    """Starlino's complementary filter: weighted mean of small rotations, no centrifugal term.
 
     The first field sets the heading.  Started in the air it begins with the tutorial's unit matrix, which corrects
     itself (comment 112).

@@ -318,7 +318,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class ApDcm(Compiled[ApDcmParams]):
-    """ArduPilot's DCM of July 2013, with its quirks corrected unless the parameters restore them; see the module."""
+    """ArduPilot's DCM of July 2013 with its known faults corrected."""
 
     heading_reference: HeadingReference = "course"  # "nose" where a magnetometer is known to be fitted
     uses = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
@@ -340,6 +340,6 @@ class ApDcm(Compiled[ApDcmParams]):
 
 
 class ApDcm2013(ApDcm):
-    """The original of 12 July 2013: `ApDcm` with all quirks."""
+    """ArduPilot's DCM of 12 July 2013 as it was, with all its faults."""
 
     _default = AP_DCM_2013

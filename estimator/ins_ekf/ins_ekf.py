@@ -282,7 +282,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class InsEkf(Compiled[InsEkfParams]):
-    """An inertial navigation filter that models the sensors and learns the wind; see the module.
+    """Error-state Kalman filter with 21 states that models the sensors and learns the wind.
 
     Started at power-up it assumes rest; started in the air it takes velocity and heading from the first fix.
     """
