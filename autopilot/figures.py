@@ -6,6 +6,15 @@ remaining errors (speed, crosswind, gyro saturation).
 
 Every figure begins with a run-in, wings level at constant pitch, to gain or lose speed.  Final attitudes are stated for
 rates that are followed exactly from the pitch of the run-in.
+
+Parameters of all figures
+-------------------------
+begin_s             start of the run-in, since the release
+after               setpoint after the figure, usually level flight
+pitch_rate_rad_s, roll_rate_rad_s    magnitude of the rates.  Lower pitch rate: larger loops, more speed needed at the
+                    top; higher: more lift needed at the bottom
+run_in              before the figure; its throttle is used in the figure, too, unless stated otherwise
+right               direction
 """
 
 import math
@@ -39,65 +48,38 @@ class _Step(NamedTuple):
 
 
 def inside_loops(
-    begin_s: float, count: int, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), run_in: RunIn =
-    LEVEL,
+    begin_s: float, count: int, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0),
+    run_in: RunIn = LEVEL,
 ) -> Manoeuvre:  # fmt: skip
-    """Inside loops at constant pitch rate, ending at the attitude of the run-in.
+    """`count` inside loops at constant pitch rate, ending at the attitude of the run-in.
 
-    Parameters
-    ----------
-    begin_s             start of the run-in, since the release
-    count               number of loops
-    after               setpoint after the last loop, usually level flight
-    pitch_rate_rad_s    lower: larger loops, more speed needed at the top; higher: more lift needed at the bottom
-    run_in              its throttle is used in the loops, too
-
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + 2 pi count / pitch rate`` after it begins
+    Ends ``run-in + 2 pi count / pitch rate`` after it begins.
     """
     _require_positive("inside_loops", count=count, pitch_rate_rad_s=pitch_rate_rad_s)
     return _in_turn(begin_s, after, *_rotated(run_in, ("pitch", count * WHOLE, pitch_rate_rad_s)))
 
 
 def outside_loops(
-    begin_s: float, count: int, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(68.0), run_in: RunIn =
-    LEVEL,
+    begin_s: float, count: int, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(68.0),
+    run_in: RunIn = LEVEL,
 ) -> Manoeuvre:  # fmt: skip
-    """Outside loops, pushed from the top at constant pitch rate, ending at the attitude of the run-in.
+    """`count` outside loops, pushed from the top at constant pitch rate, ending at the attitude of the run-in.
 
     Inverted, a cambered wing has little lift and much drag: one loop uses up the speed of the run-in.
-
-    Parameters
-    ----------
-    pitch_rate_rad_s    magnitude of the rate, nose down
-    others              see `inside_loops`
-
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + 2 pi count / pitch rate`` after it begins
+    Ends ``run-in + 2 pi count / pitch rate`` after it begins.
     """
     _require_positive("outside_loops", count=count, pitch_rate_rad_s=pitch_rate_rad_s)
     return _in_turn(begin_s, after, *_rotated(run_in, ("pitch", -count * WHOLE, pitch_rate_rad_s)))
 
 
 def aileron_roll(
-    begin_s: float, turns: float, after: Setpoint, *, right: bool = True, roll_rate_rad_s: float =
-    math.radians(180.0), run_in: RunIn = NOSE_UP,
+    begin_s: float, turns: float, after: Setpoint, *, right: bool = True,
+    roll_rate_rad_s: float = math.radians(180.0), run_in: RunIn = NOSE_UP,
 ) -> Manoeuvre:  # fmt: skip
-    """Continuous aileron rolls, ending at the attitude of the run-in.
+    """`turns` continuous aileron rolls, also halves, ending at the attitude of the run-in.
 
     The nose drops during the roll, as the lift points sideways and down: the run-in raises it.
-
-    Parameters
-    ----------
-    turns               number of rolls, also halves
-    roll_rate_rad_s     magnitude of the rate
-    others              see `inside_loops`
-
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + 2 pi turns / roll rate`` after it begins
+    Ends ``run-in + 2 pi turns / roll rate`` after it begins.
     """
     _require_positive("aileron_roll", turns=turns, roll_rate_rad_s=roll_rate_rad_s)
     angle_rad = turns * WHOLE if right else -turns * WHOLE
@@ -105,14 +87,12 @@ def aileron_roll(
 
 
 def immelmann(
-    begin_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), roll_rate_rad_s: float =
-    math.radians(180.0), run_in: RunIn = LEVEL,
+    begin_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0),
+    roll_rate_rad_s: float = math.radians(180.0), run_in: RunIn = LEVEL,
 ) -> Manoeuvre:  # fmt: skip
     """Half loop up, then half roll to the right: ends level and higher, heading reversed.
 
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + (pi - pitch of the run-in) / pitch rate + pi / roll rate`` after it begins
+    Ends ``run-in + (pi - pitch of the run-in) / pitch rate + pi / roll rate`` after it begins.
     """
     _require_positive("immelmann", pitch_rate_rad_s=pitch_rate_rad_s, roll_rate_rad_s=roll_rate_rad_s)
     up = _rotated(run_in, ("pitch", HALF - run_in.pitch_rad, pitch_rate_rad_s))
@@ -120,14 +100,12 @@ def immelmann(
 
 
 def split_s(
-    begin_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), roll_rate_rad_s: float =
-    math.radians(180.0), run_in: RunIn = NOSE_UP,
+    begin_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0),
+    roll_rate_rad_s: float = math.radians(180.0), run_in: RunIn = NOSE_UP,
 ) -> Manoeuvre:  # fmt: skip
     """Half roll to the right, then half loop down, motor off: ends level and lower, heading reversed.
 
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + pi / roll rate + (pi + pitch of the run-in) / pitch rate`` after it begins
+    Ends ``run-in + pi / roll rate + (pi + pitch of the run-in) / pitch rate`` after it begins.
     """
     _require_positive("split_s", pitch_rate_rad_s=pitch_rate_rad_s, roll_rate_rad_s=roll_rate_rad_s)
     roll = _rotated(run_in, ("roll", HALF, roll_rate_rad_s))
@@ -136,20 +114,15 @@ def split_s(
 
 
 def vertical_climb(
-    begin_s: float, climb_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0), pull_to_rad:
-    float = QUARTER, run_in: RunIn = LEVEL,
+    begin_s: float, climb_s: float, after: Setpoint, *, pitch_rate_rad_s: float = math.radians(100.0),
+    pull_to_rad: float = QUARTER, run_in: RunIn = LEVEL,
 ) -> Manoeuvre:  # fmt: skip
     """Pull to the vertical, zero rates for `climb_s`, then push over to a level nose.
 
-    Parameters
-    ----------
-    climb_s             duration of the vertical part, ending with some speed left
-    pull_to_rad         pitch at the end of the pull: slightly beyond the vertical if the nose falls back when slow
-    others              see `inside_loops`
+    Ends ``run-in + (2 pull_to - pitch of the run-in) / pitch rate + climb_s`` after it begins.
 
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + (2 pull_to - pitch of the run-in) / pitch rate + climb_s`` after it begins
+    climb_s : of the vertical part, ending with some speed left
+    pull_to_rad : pitch at the end of the pull, slightly beyond the vertical if the nose falls back when slow
     """
     climb = _straight_up("vertical_climb", climb_s, pitch_rate_rad_s, pull_to_rad, run_in)
     over = _rotation("pitch", -pull_to_rad, pitch_rate_rad_s, run_in.throttle)
@@ -157,24 +130,18 @@ def vertical_climb(
 
 
 def stall_turn(
-    begin_s: float, climb_s: float, after: Setpoint, *, right: bool = False, pitch_rate_rad_s: float =
-    math.radians(100.0), pull_to_rad: float = QUARTER, over_s: float = 1.6, dive_s: float = 0.5, run_in: RunIn =
-    LEVEL,
+    begin_s: float, climb_s: float, after: Setpoint, *, right: bool = False,
+    pitch_rate_rad_s: float = math.radians(100.0), pull_to_rad: float = QUARTER, over_s: float = 1.6,
+    dive_s: float = 0.5, run_in: RunIn = LEVEL,
 ) -> Manoeuvre:  # fmt: skip
     """Vertical climb, full rudder until the nose points down, dive, pull-out: ends level, heading reversed.
 
-    Parameters
-    ----------
-    climb_s             duration of the vertical part, until the rudder in the slipstream can turn the nose over
-    right               direction; the torque of a clockwise motor helps to the left
-    over_s              duration of full rudder and throttle; the yaw rate depends on the aeroplane
-    dive_s              duration of the vertical dive before the pull, motor off
-    others              see `inside_loops` and `vertical_climb`
+    Ends ``run-in + (2 pull_to - pitch of the run-in) / pitch rate + climb_s + over_s + dive_s`` after it begins.
 
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + (2 pull_to - pitch of the run-in) / pitch rate + climb_s + over_s + dive_s``
-                        after it begins
+    climb_s : of the vertical part, until the rudder in the slipstream can turn the nose over
+    pull_to_rad : see `vertical_climb`       right : the torque of a clockwise motor helps to the left
+    over_s : of full rudder and throttle; the yaw rate depends on the aeroplane
+    dive_s : of the vertical dive before the pull, motor off
     """
     _require_positive("stall_turn", over_s=over_s, dive_s=dive_s)
     climb = _straight_up("stall_turn", climb_s, pitch_rate_rad_s, pull_to_rad, run_in)
@@ -186,26 +153,19 @@ def stall_turn(
 
 
 def spin(
-    begin_s: float, hold_s: float, after: Setpoint, *, right: bool = False, throttle: float = 0.6, recovery_s: float
-    = 0.4, run_in: RunIn = STALLING,
+    begin_s: float, hold_s: float, after: Setpoint, *, right: bool = False, throttle: float = 0.6,
+    recovery_s: float = 0.4, run_in: RunIn = STALLING,
 ) -> Manoeuvre:  # fmt: skip
     """Stall, spin with full rudder and up-elevator, and standard recovery.
 
     Manual control: full rudder and full up-elevator for `hold_s`; then power off, ailerons neutral, full opposite
-    rudder, elevator forward.
+    rudder, elevator forward.  Ends ``run-in + hold_s + recovery_s`` after it begins.
 
-    Parameters
-    ----------
-    hold_s              duration of the spin controls; the number of turns depends on the aeroplane
-    right               direction of the rudder; the torque of a clockwise motor helps to the left
-    throttle            in the spin: above 0 if the elevator cannot hold the stall without slipstream
-    recovery_s          until the rotation stops; longer opposite rudder may start a new spin
-    run_in              motor off and nose up until the wing stalls
-    others              see `inside_loops`
-
-    Returns
-    -------
-    Manoeuvre           ends ``run-in + hold_s + recovery_s`` after it begins
+    hold_s : of the spin controls; the number of turns depends on the aeroplane
+    right : of the rudder; the torque of a clockwise motor helps to the left
+    throttle : in the spin, above 0 if the elevator cannot hold the stall without slipstream
+    recovery_s : until the rotation stops; longer opposite rudder may start a new spin
+    run_in : motor off and nose up until the wing stalls
     """
     _require_positive("spin", hold_s=hold_s, recovery_s=recovery_s)
     rudder = 1.0 if right else -1.0
@@ -215,20 +175,14 @@ def spin(
 
 
 def inverted_circuit(
-    begin_s: float, course: Setpoint, legs: int, leg_s: float, after: Setpoint, *, turn_rad: float = QUARTER,
+    begin_s: float, course: Setpoint, legs: int, leg_s: float, after: Setpoint, *, turn_rad: float = QUARTER
 ) -> Manoeuvre:  # fmt: skip
     """Inverted flight along `legs` courses, each turned by `turn_rad`: four right angles form a square.
 
-    Parameters
-    ----------
-    course      COURSE setpoint of the first leg, flown inverted; the autopilot does the roll
-    leg_s       time between course changes
-    after       setpoint afterwards, usually upright flight
-    turn_rad    change of course, positive to the right
+    Ends ``legs * leg_s`` after it begins.
 
-    Returns
-    -------
-    Manoeuvre   ends ``legs * leg_s`` after it begins
+    course : COURSE setpoint of the first leg, flown inverted; the autopilot does the roll
+    leg_s : between course changes            turn_rad : positive to the right
     """
     _require_positive("inverted_circuit", legs=legs, leg_s=leg_s)
     if course.mode != Mode.COURSE:

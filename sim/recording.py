@@ -96,10 +96,8 @@ def check_writable(directory: str | Path) -> None:
     ------
     RecordingError    naming the directory and the reason
     """
-    try:
+    with _writing(Path(directory)):
         drafts.probe(Path(directory))
-    except OSError as error:
-        raise _unwritable(Path(directory), error) from error
 
 
 @contextmanager
@@ -114,12 +112,11 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     temporary = drafts.hidden(path)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        drafts.sweep(path.parent)
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        raise _unwritable(path, error) from error
+        with _writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            drafts.sweep(path.parent)
+            yield temporary
+            os.replace(temporary, path)
     finally:
         # Also on Ctrl-C; nothing to remove after the rename.
         with suppress(OSError):
@@ -134,14 +131,11 @@ def new_folder(into: Path, name: str) -> Iterator[drafts.Draft]:
     ------
     RecordingError    the folder cannot be written
     """
-    try:
-        with drafts.new_folder(into, name) as draft:
-            try:
-                yield draft
-            except RecordingError as error:
-                raise RecordingError(draft.named(str(error))) from error
-    except OSError as error:
-        raise _unwritable(into / name, error) from error
+    with _writing(into / name), drafts.new_folder(into, name) as draft:
+        try:
+            yield draft
+        except RecordingError as error:
+            raise RecordingError(draft.named(str(error))) from error
 
 
 def save(flight: Flight, directory: str | Path) -> Path:
@@ -302,11 +296,16 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _unwritable(path: Path, error: OSError) -> RecordingError:
-    said = error.strerror or _first_line(error)
-    if error.errno and "[errno" in said:  # shorten Arrow's message
-        said = os.strerror(error.errno)
-    return RecordingError(f"cannot write to {path}: {said}")
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Turn an OSError inside the block into a RecordingError about `path`."""
+    try:
+        yield
+    except OSError as error:
+        said = error.strerror or _first_line(error)
+        if error.errno and "[errno" in said:  # shorten Arrow's message
+            said = os.strerror(error.errno)
+        raise RecordingError(f"cannot write to {path}: {said}") from error
 
 
 def _first_line(error: Exception) -> str:

@@ -10,6 +10,7 @@ from estimator.compiler.jit import kernel
 from estimator.premerlani import Premerlani, step
 from scenarios.harness.claims.claim import Finding, Paper, Verdict, claim, line
 from scenarios.harness.claims.flights import flights, hit_ground, percentage, pooled_rms, tuned
+from scenarios.harness.claims.motions import NEVER
 from scenarios.harness.claims.picture import BLUE, GREEN, ORANGE, RED, Panel
 from scenarios.harness.metrics import bank_size_deg, inclination_error_deg, time_s
 
@@ -53,7 +54,7 @@ def centrifugal_compensation(seeds: Sequence[int]) -> Finding:
     calm = {**LASTS, "air.wind_m_s": 0.0}
     compensated = flights("circle", seeds, calm)
     # No launch gate either, which would drop readings whose length differs from gravity.
-    uncompensated = flights("circle", seeds, {**calm, **tuned(launch_gate=1e9)}, Uncompensated)
+    uncompensated = flights("circle", seeds, {**calm, **tuned(launch_gate=NEVER)}, Uncompensated)
     good, bad = (pooled_rms(flown, inclination_error_deg, SETTLED_S) for flown in (compensated, uncompensated))
     bank = float(np.median([np.median(bank_size_deg(f).within(SETTLED_S, math.inf).value) for f in compensated]))
     swayed = np.concatenate([bank_size_deg(f).within(10.0, math.inf).value for f in uncompensated])

@@ -104,7 +104,7 @@ def _recovery_s(flight: Flight, from_s: float) -> float:
 
 @claim(Paper.THEORY, "GPS, second reason for a large weight", seeds=6)
 def crosswind_reversal(seeds: Sequence[int]) -> Finding:
-    """A reversal in a crosswind turns the nose off by twice the crab angle.
+    """After a reversal in a crosswind the heading is off by twice the crab angle.
 
     After long flight in a crosswind and a turn of 180 degrees, the nose is for a while turned to the wrong side of the
     track, opposite to the angle that the wind requires; a large yaw weight shortens this.
@@ -125,7 +125,9 @@ def crosswind_reversal(seeds: Sequence[int]) -> Finding:
         else "most flights end before the heading stays within 10 degrees of the course"
     )
 
-    panel = Panel("Reversal: heading minus course", "crab angles", "s after the turn begins", xlim=(-20.0, 58.0))
+    panel = Panel(
+        "Reversal: heading minus course", "crabs", "s after the turn begins", xlim=(-20.0, 58.0), ylim=(-1.2, 2.6)
+    )
     for flown, colour, w_y in ((small, RED, SMALL), (large, BLUE, LARGE)):
         curves = []
         for flight in flown:

@@ -16,7 +16,6 @@ from scenarios.harness.claims.flights import flights, rms_of_each, tuned
 from scenarios.harness.claims.motions import STEP_S, aboard, attitude_deg, begin, misread, printed, sensed, tilt_deg
 from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, RED, VIOLET, Panel
 from scenarios.harness.metrics import Series, inclination_error_deg, rms, settled_after_s
-from sim.log import Phase
 from sim.motion.prescribed_plant import Kinematics, SteadyTurn, StraightLevel
 
 TILT_DEG, WATCHED_S = 9.0, 20.0
@@ -185,7 +184,6 @@ class Pause:
     go_s: float = 190.0
     change_s: float = 10.0
     speed_m_s: float = 12.6
-    phase: ClassVar[Phase] = Phase.FLYING
     wind_e_m_s: ClassVar[tuple[float, float, float]] = (0.0, 0.0, 0.0)
 
     def at(self, t_s: Array) -> Kinematics:

@@ -109,6 +109,32 @@ def offset_at_power_up(seeds: Sequence[int]) -> Finding:
     )
 
 
+@claim(Paper.THEORY, "Gyro characteristics, Gyro sensitivity", seeds=5)
+def sensitive_gyros(seeds: Sequence[int]) -> Finding:
+    """Gyros need not be sensitive.
+
+    It was once thought that gyros of 15 mV per deg/s were needed; the matrix works well with less sensitive ones.
+    """
+    boards = {"ADXRS401, 15 mV/(deg/s)": "devboard_green", "LISY300AL, 3.3 mV/(deg/s)": "devboard_red"}
+    each = {
+        gyro: rms_of_each(flights("turns_180", seeds, {"suite": suite}), inclination_error_deg)
+        for gyro, suite in boards.items()
+    }
+    sensitive, coarse = (rms(values) for values in each.values())
+
+    panel = Panel(
+        "Inclination error in turns in wind", "deg RMS", columns=2, ylim=(0.0, 1.25 * np.max([*each.values()]))
+    )
+    bars = {gyro: (values, colour) for (gyro, values), colour in zip(each.items(), (ORANGE, BLUE), strict=True)}
+    panel.bars([f"seed {seed}" for seed in seeds], bars)
+    return Finding(
+        lines=[line("inclination error, less sensitive over sensitive", "", coarse / sensitive, "<=", 1.2)],
+        summary=f"In the same turns and wind the inclination error is {sensitive:.2f} degrees RMS with gyros of "
+        f"15 mV/(deg/s) and {coarse:.2f} with gyros of 3.3, whose resolution is almost five times coarser.",
+        panels=[panel],
+    )
+
+
 GAIN = 1.1
 
 
@@ -149,32 +175,6 @@ def gain_as_offset() -> Finding:
         f"{predicted[2]:.2f}. The attitude error is {error[-1]:.1f} degrees, without the integral {left[-1]:.1f}. What "
         "was learnt is wrong as soon as the turn ends.",
         panels=[rates, angle],
-    )
-
-
-@claim(Paper.THEORY, "Gyro characteristics, Gyro sensitivity", seeds=5)
-def sensitive_gyros(seeds: Sequence[int]) -> Finding:
-    """Gyros need not be sensitive.
-
-    It was once thought that gyros of 15 mV per deg/s were needed; the matrix works well with less sensitive ones.
-    """
-    boards = {"ADXRS401, 15 mV/(deg/s)": "devboard_green", "LISY300AL, 3.3 mV/(deg/s)": "devboard_red"}
-    each = {
-        gyro: rms_of_each(flights("turns_180", seeds, {"suite": suite}), inclination_error_deg)
-        for gyro, suite in boards.items()
-    }
-    sensitive, coarse = (rms(values) for values in each.values())
-
-    panel = Panel(
-        "Inclination error in turns in wind", "deg RMS", columns=2, ylim=(0.0, 1.25 * np.max([*each.values()]))
-    )
-    bars = {gyro: (values, colour) for (gyro, values), colour in zip(each.items(), (ORANGE, BLUE), strict=True)}
-    panel.bars([f"seed {seed}" for seed in seeds], bars)
-    return Finding(
-        lines=[line("inclination error, less sensitive over sensitive", "", coarse / sensitive, "<=", 1.2)],
-        summary=f"In the same turns and wind the inclination error is {sensitive:.2f} degrees RMS with gyros of "
-        f"15 mV/(deg/s) and {coarse:.2f} with gyros of 3.3, whose resolution is almost five times coarser.",
-        panels=[panel],
     )
 
 

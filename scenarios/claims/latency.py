@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from scenarios.harness.claims.flights import TURNING_DEG, course_error_deg, flig
 from scenarios.harness.claims.motions import EQUATIONS_ONLY, sensed
 from scenarios.harness.claims.picture import BLUE, FAINT, ORANGE, RED, Panel
 from scenarios.harness.metrics import bank_size_deg, heading_error_deg, inclination_error_deg, time_s
-from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, Kinematics
+from sim.motion.prescribed_plant import Kinematics
 
 COURSE = heading_error_deg("course")
 SETTLED_S = 20.0
@@ -30,8 +29,6 @@ class Kink:
 
     at_s: float = 10.0
     speed_m_s: float = 12.6
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`; the acceleration of the step itself is left out."""

@@ -136,12 +136,7 @@ def forward_acceleration(seeds: Sequence[int]) -> Finding:
     throw.level(felt, RED)
     throw.note("apparent inclination in the throw", 15.0, felt - 5.5, RED, ha="right")
     average = Panel(
-        "Forward acceleration in flight",
-        "as inclination, deg RMS",
-        "window, s",
-        log="xy",
-        xticks=WINDOWS_S,
-        yticks=(0.1, 1),
+        "In flight, averaged", "inclination, deg RMS", "window, s", log="xy", xticks=WINDOWS_S, yticks=(0.1, 0.3, 1, 3)
     )
     average.curve(WINDOWS_S, means, BLUE, style="o-")
     return Finding(

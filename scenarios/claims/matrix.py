@@ -115,7 +115,7 @@ def _up_and_loops_rad_s() -> Array:
 
 @claim(Paper.THEORY, "Accelerometers, on direction cosines")
 def any_orientation() -> Finding:
-    """All attitudes are equally good.
+    """No attitude is singular.
 
     Direction cosines work in any orientation, also pointing vertically, without singularities or special logic.
     """

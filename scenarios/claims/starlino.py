@@ -181,12 +181,13 @@ def starlino_drift(seeds: Sequence[int]) -> Finding:
         tuple(rms(column) for column in np.array(values).T) for values in ends.values()
     )
 
-    panels = [
-        Panel("Inclination, held in a hand", "inclination error, deg", "time, minutes", log="y", ylim=(0.1, 2000.0)),
-        Panel("Heading, held in a hand", "heading error, deg", "time, minutes", log="y", ylim=(0.1, 2000.0)),
-    ]
-    for panel, errors in zip(panels, (tilts, headings), strict=True):
-        panel.curves(log.truth["t_s"][::50] / 60.0, errors, (FAINT, ORANGE, BLUE), lw=1.5)
+    panels = []
+    for errors, what in ((tilts, "inclination"), (headings, "heading")):
+        panel = Panel(f"Held in a hand: {what}", f"{what} error, deg", "time, minutes", log="y", ylim=(0.1, 2000.0))
+        for name, colour in zip(ends, (FAINT, ORANGE, BLUE), strict=True):
+            minutes = log.truth["t_s"][::50] / 60.0
+            panel.curve(minutes, errors[name], colour, name, lw=3.0 if name == "6 axes" else 1.5)
+        panels.append(panel)
     return Finding(
         lines=[
             line("6 axes: largest inclination error in 10 minutes", "deg", six_tilt, "<=", 3.0),

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -19,8 +18,8 @@ from scenarios.harness.claims.picture import BLUE, FAINT, GREEN, ORANGE, Panel
 from scenarios.harness.metrics import survived, time_s
 from scenarios.harness.metrics.manoeuvres import inverted
 from scenarios.inverted import FIRST_S, LEGS
-from sim.log import Flight, Log, Phase
-from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics, Motion, SteadyTurn
+from sim.log import Flight, Log
+from sim.motion.prescribed_plant import GRAVITY_M_S2, Kinematics, Motion, SteadyTurn
 
 FLOWN_S, SETTLED_S = 120.0, 20.0
 BANK_RAD = math.radians(20.0)
@@ -35,8 +34,6 @@ class OnItsBack:
     bank_rad: float
     airspeed_m_s: float = 12.6
     height_m: float = 60.0
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`: path and heading of a `SteadyTurn`, rolled by half a turn about the nose."""

@@ -216,8 +216,7 @@ def van_zundert_normalisation() -> Finding:
     (length, slant), (taylor_length, taylor_slant) = (_left_over(300.0, way) for way in ways.values())
 
     panels = []
-    for i, (title, y) in enumerate((("Length of the rows", "largest error of a length"),
-                                    ("Angle between rows", "largest cosine"))):  # fmt: skip
+    for i, (title, y) in enumerate((("Length of the rows", "largest error"), ("Angle between rows", "largest cosine"))):
         panel = Panel(title, y, "rate of rotation, deg/s", log="xy", ylim=(1e-17, 1.0))
         shown = {name: np.maximum(values[:, i], 1e-16) for name, values in left.items()}
         panel.curves(rates, shown, (BLUE, ORANGE), "o-", ms=3, lw=1.5)

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -14,8 +13,7 @@ from scenarios.harness.claims.flights import slowest
 from scenarios.harness.claims.motions import attitude_deg, begin, misread, printed, sensed
 from scenarios.harness.claims.picture import BLUE, ORANGE, RED, Panel
 from scenarios.harness.metrics import Series, settled_after_s
-from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, Kinematics
+from sim.motion.prescribed_plant import Kinematics
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +24,6 @@ class UpAndOn:
     on_s: float = 90.0
     change_s: float = 10.0
     speed_m_s: float = 12.6
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`: the nose points along the velocity."""

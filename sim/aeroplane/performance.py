@@ -74,8 +74,12 @@ def measure(model: "Model", height_m: float = 60.0) -> Performance:
         top_speed = _top_speed(model, cruise, height_m)
         speeds = np.linspace(1.03 * stall.airspeed_m_s, 0.999 * top_speed.airspeed_m_s, 30)
         climbs, levels = _sweep(model, speeds, height_m, throttle=1.0), _sweep(model, speeds, height_m, throttle=None)
-        best_climb = _best_climb(model, climbs, height_m, lambda t: t.climb_m_s)
-        steepest = _best_climb(model, climbs, height_m, lambda t: t.climb_rad)
+
+        def climb(speed_m_s: float, near: Trim) -> Trim:
+            return trim(model, speed_m_s, height_m, throttle=1.0, guess=near)
+
+        best_climb = _refined(climbs, climb, lambda t: t.airspeed_m_s, lambda t: t.climb_m_s, 1e-5)
+        steepest = _refined(climbs, climb, lambda t: t.airspeed_m_s, lambda t: t.climb_rad, 1e-5)
     return Performance(
         height_m, cruise, polar, stall, stall_by, glide.best(polar, lambda t: t.climb_rad), min_sink, climbs, levels,
         best_climb, steepest, top_speed, *turns(model, min_sink, height_m), roll(model, cruise, height_m),
@@ -114,19 +118,30 @@ class Glides:
 
     def best(self, polar: tuple[Trim, ...], merit: Callable[[Trim], float]) -> Trim:
         """The glide of highest merit, refined between the neighbours of the best of `polar`."""
-        i = max(range(len(polar)), key=lambda k: merit(polar[k]))
-        low, high = polar[max(i - 1, 0)].alpha_rad, polar[min(i + 1, len(polar) - 1)].alpha_rad
-        tried = [polar[i]]
+        return _refined(polar, self.at, lambda t: t.alpha_rad, merit, 1e-6)
 
-        def cost(alpha_rad: float) -> float:
-            t = self.at(float(alpha_rad), polar[i])
-            if t is None:
-                return math.inf
-            tried.append(t)
-            return -merit(t)
 
-        minimize_scalar(cost, bounds=(low, high), method="bounded", options={"xatol": 1e-6})
-        return max(tried, key=merit)
+def _refined(
+    trims: tuple[Trim, ...], at: Callable[[float, Trim], Trim | None], by: Callable[[Trim], float],
+    merit: Callable[[Trim], float], within: float,
+) -> Trim:  # fmt: skip
+    """The trim of highest merit between the neighbours of the best of `trims`, which are sorted by `by`.
+
+    at : the trim at a value of `by`, starting from a trim nearby; None if there is none      within : of that value
+    """
+    i = max(range(len(trims)), key=lambda k: merit(trims[k]))
+    tried = [trims[i]]
+
+    def cost(x: float) -> float:
+        t = at(float(x), trims[i])
+        if t is None:
+            return math.inf
+        tried.append(t)
+        return -merit(t)
+
+    bounds = by(trims[max(i - 1, 0)]), by(trims[min(i + 1, len(trims) - 1)])
+    minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": within})
+    return max(tried, key=merit)
 
 
 def _sweep(model: "Model", speeds_m_s: np.ndarray, height_m: float, throttle: float | None) -> tuple[Trim, ...]:
@@ -139,20 +154,6 @@ def _sweep(model: "Model", speeds_m_s: np.ndarray, height_m: float, throttle: fl
         except ValueError:
             continue
     return tuple(found)
-
-
-def _best_climb(model: "Model", climbs: tuple[Trim, ...], height_m: float, merit: Callable[[Trim], float]) -> Trim:
-    """The climb of highest merit, refined between the neighbours of the best of `climbs`."""
-    i = max(range(len(climbs)), key=lambda k: merit(climbs[k]))
-    tried = [climbs[i]]
-
-    def cost(speed_m_s: float) -> float:
-        tried.append(trim(model, float(speed_m_s), height_m, throttle=1.0, guess=climbs[i]))
-        return -merit(tried[-1])
-
-    bounds = climbs[max(i - 1, 0)].airspeed_m_s, climbs[min(i + 1, len(climbs) - 1)].airspeed_m_s
-    minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-5})
-    return max(tried, key=merit)
 
 
 def _top_speed(model: "Model", cruise: Trim, height_m: float) -> Trim:

@@ -18,26 +18,8 @@ from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from sim.gps_messages.fixes import (
-    EPOCH,
-    LAUNCH,
-    NAN,
-    NS,
-    START,
-    Epoch,
-    Fixes,
-    Place,
-    Problem,
-    Reading,
-    assemble,
-    date_time,
-    geodetic,
-    needed,
-    read,
-    stamps_ns,
-    utc_ns,
-    write,
-)
+from sim.gps_messages import fixes as common
+from sim.gps_messages.fixes import LAUNCH, NAN, NS, START, Epoch, Fixes, Place, Problem, Reading
 
 KNOT_M_S: Final = 1852.0 / 3600.0  # by definition
 _MINUTE: Final = 10**7  # units of position in a minute of arc
@@ -47,12 +29,12 @@ _OURS: Final = re.compile(rb"\$(?!P)[A-Z]{2}(GGA|RMC|VTG),")
 
 def write_nmea(fixes: Fixes, file: str | Path, place: Place = LAUNCH, start: datetime = START) -> Path:
     """Write `encode_nmea` of the same arguments to `file`, complete or not at all, and return its path."""
-    return write(file, encode_nmea(fixes, place, start))
+    return common.write(file, encode_nmea(fixes, place, start))
 
 
 def read_nmea(file: str | Path, place: Place | None = None, start: datetime | None = None) -> Reading:
     """`decode_nmea` of the contents of `file`; ValueError, with its name, if it cannot be read or has no fix."""
-    return read(file, decode_nmea, place, start)
+    return common.read(file, decode_nmea, place, start)
 
 
 def encode_nmea(fixes: Fixes, place: Place = LAUNCH, start: datetime = START, talker: str = "GN") -> bytes:
@@ -66,12 +48,12 @@ def encode_nmea(fixes: Fixes, place: Place = LAUNCH, start: datetime = START, ta
     ------
     ValueError      pynmeagps is not installed, or a date that cannot be written
     """
-    nmea = needed("pynmeagps")
+    nmea = common.needed("pynmeagps")
     if not re.fullmatch("[A-Z]{2}", talker):
         raise ValueError(f"talker {talker!r}: must be two capital letters, for instance GN")
-    there = geodetic(fixes.p_e_m, place)
+    there = common.geodetic(fixes.p_e_m, place)
     sentences = []
-    for i, ns in enumerate(stamps_ns(fixes, start)):
+    for i, ns in enumerate(common.stamps_ns(fixes, start)):
         for name, payload in _payloads(fixes, i, ns, there[i].tolist()):
             sentences.append(nmea.NMEAMessage(talker, name, nmea.GET, payload=payload).serialize())
     return b"".join(sentences)
@@ -93,7 +75,7 @@ def decode_nmea(data: bytes, place: Place | None = None, start: datetime | None 
     problems: list[Problem] = []
     sentences, ignored = _sentences(data, problems)
     epochs = _epochs(_groups(sentences, problems), start or START, problems)
-    return assemble(epochs, problems, ignored, place, start)
+    return common.assemble(epochs, problems, ignored, place, start)
 
 
 def _payloads(fixes: Fixes, i: int, ns: int | None, there: list[float]) -> Iterator[tuple[str, list[str]]]:
@@ -121,7 +103,7 @@ def _clock(ns: int | None) -> tuple[str, str]:
     if ns is None:
         return "", ""
     milliseconds = (ns + 500_000) // 1_000_000
-    moment = date_time(milliseconds * 1_000_000)
+    moment = common.date_time(milliseconds * 1_000_000)
     return f"{moment:%H%M%S}.{milliseconds % 1000:03d}", f"{moment:%d%m%y}"
 
 
@@ -141,7 +123,7 @@ class _Sentence(NamedTuple):
 
 def _sentences(data: bytes, problems: list[Problem]) -> tuple[list[_Sentence], int]:
     """The sentences about fixes, and the number of others."""
-    nmea = needed("pynmeagps")
+    nmea = common.needed("pynmeagps")
     found, ignored = [], 0
     lines = data.split(b"\n")
     for number, line in enumerate(lines, 1):
@@ -175,7 +157,7 @@ class _Group(NamedTuple):
     def day(self) -> int | None:
         """Date of the group in days since 1970."""
         dates = (getattr(s.message, "date", None) for s in self.sentences)
-        return next(((d - EPOCH.date()).days for d in dates if isinstance(d, date)), None)
+        return next(((d - common.EPOCH.date()).days for d in dates if isinstance(d, date)), None)
 
 
 def _groups(sentences: list[_Sentence], problems: list[Problem]) -> list[_Group]:
@@ -225,7 +207,7 @@ def _dated(groups: list[_Group], start: datetime) -> Iterator[int]:
         turns.append(before)
     said = [(group.day, turn) for group, turn in zip(groups, turns, strict=True)]
     first = next(((day, turn) for day, turn in said if day is not None), None)
-    base = utc_ns(start) // _DAY_NS if first is None else first[0] - first[1]
+    base = common.utc_ns(start) // _DAY_NS if first is None else first[0] - first[1]
     for group, (day, turn) in zip(groups, said, strict=True):
         base = base if day is None else day - turn
         yield (base + turn) * _DAY_NS + group.clock_ns

@@ -16,44 +16,27 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
 
-from sim.gps_messages.fixes import (
-    LAUNCH,
-    NAN,
-    NS,
-    START,
-    Epoch,
-    Fixes,
-    Place,
-    Problem,
-    Reading,
-    assemble,
-    date_time,
-    geodetic,
-    needed,
-    read,
-    stamps_ns,
-    utc_ns,
-    write,
-)
+from sim.gps_messages import fixes as common
+from sim.gps_messages.fixes import LAUNCH, NAN, NS, START, Epoch, Fixes, Place, Problem, Reading
 
 _SYNC: Final = b"\xb5b"
 _NAV_PVT: Final = b"\x01\x07"
 _SHORTEST: Final = 84  # bytes of payload, u-blox 7; 92 since u-blox 8
 _FRAME: Final = 8  # bytes around the payload: sync, class, identity, length, checksum
 _UNKNOWN: Final = 2**32 - 1
-_GPS_EPOCH_NS: Final = utc_ns(datetime(1980, 1, 6, tzinfo=UTC))
+_GPS_EPOCH_NS: Final = common.utc_ns(datetime(1980, 1, 6, tzinfo=UTC))
 _WEEK_MS: Final = 7 * 86_400 * 1000
 _2D, _3D, _WITH_DEAD_RECKONING = 2, 3, 4  # fixType with satellites
 
 
 def write_ubx(fixes: Fixes, file: str | Path, place: Place = LAUNCH, start: datetime = START) -> Path:
     """Write `encode_ubx` of the same arguments to `file`, complete or not at all, and return its path."""
-    return write(file, encode_ubx(fixes, place, start))
+    return common.write(file, encode_ubx(fixes, place, start))
 
 
 def read_ubx(file: str | Path, place: Place | None = None, start: datetime | None = None) -> Reading:
     """`decode_ubx` of the contents of `file`; ValueError, with its name, if it cannot be read or has no fix."""
-    return read(file, decode_ubx, place, start)
+    return common.read(file, decode_ubx, place, start)
 
 
 def encode_ubx(fixes: Fixes, place: Place = LAUNCH, start: datetime = START) -> bytes:
@@ -68,10 +51,10 @@ def encode_ubx(fixes: Fixes, place: Place = LAUNCH, start: datetime = START) -> 
     ------
     ValueError      pyubx2 is not installed, or a number or date that does not fit its field
     """
-    ubx = needed("pyubx2")
-    there = geodetic(fixes.p_e_m, place)
+    ubx = common.needed("pyubx2")
+    there = common.geodetic(fixes.p_e_m, place)
     messages = []
-    for i, ns in enumerate(stamps_ns(fixes, start)):
+    for i, ns in enumerate(common.stamps_ns(fixes, start)):
         values = _time(ns) | _fix(fixes, i, there[i].tolist(), known=ns is not None)
         try:
             messages.append(ubx.UBXMessage("NAV", "NAV-PVT", ubx.GET, **values).serialize())
@@ -90,7 +73,7 @@ def decode_ubx(data: bytes, place: Place | None = None, start: datetime | None =
     ------
     ValueError      no fix in it, or pyubx2 is not installed
     """
-    ubx = needed("pyubx2")
+    ubx = common.needed("pyubx2")
     problems: list[Problem] = []
     epochs: dict[int, Epoch] = {}
     ignored = 0
@@ -102,7 +85,7 @@ def decode_ubx(data: bytes, place: Place | None = None, start: datetime | None =
             problems.append(Problem("malformed", where, f"NAV-PVT of {len(frame) - _FRAME} bytes, too short"))
             continue
         _take(where, ubx.UBXReader.parse(frame), epochs, problems)
-    return assemble(epochs, problems, ignored, place, start)
+    return common.assemble(epochs, problems, ignored, place, start)
 
 
 def _time(ns: int | None) -> dict[str, Any]:
@@ -112,7 +95,7 @@ def _time(ns: int | None) -> dict[str, Any]:
     from pynmeagps import leapsecond  # installed with pyubx2
 
     second = (ns + NS // 200) // (NS // 100) // 100
-    utc = date_time(second * NS)
+    utc = common.date_time(second * NS)
     gps_ns = ns - _GPS_EPOCH_NS + leapsecond(utc) * NS
     return {
         "iTOW": (gps_ns + 500_000) // 1_000_000 % _WEEK_MS,
@@ -166,7 +149,7 @@ def _frames(data: bytes, problems: list[Problem]) -> Iterator[tuple[str, bytes]]
 
     After a damaged one the search resumes after its first two bytes, so that a wrong length hides no other message.
     """
-    valid = needed("pyubx2").isvalid_checksum
+    valid = common.needed("pyubx2").isvalid_checksum
     at = data.find(_SYNC)
     while at >= 0:
         where, end = f"byte {at}", at + _FRAME + int.from_bytes(data[at + 4 : at + 6], "little")
@@ -192,7 +175,7 @@ def _take(where: str, m: Any, epochs: dict[int, Epoch], problems: list[Problem])
     except ValueError as error:
         problems.append(Problem("malformed", where, f"NAV-PVT: {error}"))
         return
-    ns = utc_ns(second) + m.nano
+    ns = common.utc_ns(second) + m.nano
     if ns in epochs:
         problems.append(Problem("repeated", where, "another NAV-PVT of the same time"))
         return

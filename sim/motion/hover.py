@@ -8,13 +8,11 @@ craft.  Drag is neglected (Martin and Salauen, "The true role of accelerometer f
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from estimator.interface import Array
-from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, GRAVITY_M_S2, Kinematics
+from sim.motion.prescribed_plant import GRAVITY_M_S2, Kinematics
 
 Sines = tuple[tuple[float, float, float], ...]  # of each: amplitude, frequency in hertz, phase in radians
 
@@ -33,8 +31,6 @@ class Hover:
     yaw: Sines = ((math.radians(4.0), 0.05, 4.0), (math.radians(1.5), 0.17, 5.0))
     rotor_rpm: float = 5500.0  # not a multiple of the sample rate, which would alias to a constant force
     height_m: float = 5.0
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def __post_init__(self) -> None:
         for name in ("north", "east", "yaw"):

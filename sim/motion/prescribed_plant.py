@@ -39,14 +39,11 @@ class Kinematics:
 
 
 class Motion(Protocol):
-    """Closed-form motion of a body from `t_s` = 0; an optional ``rotor_rpm`` gives its rotor speed."""
+    """Closed-form motion of a body from `t_s` = 0.
 
-    phase: ClassVar[Phase]
-
-    @property
-    def wind_e_m_s(self) -> tuple[float, float, float]:
-        """Velocity of the air over the ground."""
-        ...
+    Optional attributes: ``phase`` (default FLYING), ``wind_e_m_s``, the velocity of the air over the ground (default
+    calm), and ``rotor_rpm``, the speed of its rotors (default 0).
+    """
 
     def at(self, t_s: Array) -> Kinematics:
         """The motion at the times `t_s`, shape (n,)."""
@@ -75,7 +72,6 @@ class Rest:
     heading_rad: float = 0.0
     height_m: float = 1.7
     phase: ClassVar[Phase] = Phase.RESTING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
@@ -96,7 +92,6 @@ class HandHeld:
     phase_rad: tuple[tuple[float, ...], ...] = ((0.0, 1.0), (2.0, 3.0), (4.0, 5.0))
     height_m: float = 1.7
     phase: ClassVar[Phase] = Phase.HELD
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
@@ -127,7 +122,6 @@ class Coning:
     rate_rad_s: float = 2.0 * math.pi
     height_m: float = 1.7
     phase: ClassVar[Phase] = Phase.HELD
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
@@ -152,8 +146,6 @@ class FreeFall:
 
     height_m: float = 100.0
     tumble_rad_s: float = 0.0
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
@@ -180,7 +172,6 @@ class StraightLevel:
     wind_e_m_s: tuple[float, float, float] = CALM
     surge_m_s2: float = 0.0
     surge_s: float = 10.0
-    phase: ClassVar[Phase] = Phase.FLYING
 
     def __post_init__(self) -> None:
         _require(self, "surge_s", "s", self.surge_s > 0.0, "a period above 0 s")
@@ -214,7 +205,6 @@ class SteadyTurn:
     heading_rad: float = 0.0
     height_m: float = 60.0
     wind_e_m_s: tuple[float, float, float] = CALM
-    phase: ClassVar[Phase] = Phase.FLYING
 
     def __post_init__(self) -> None:
         _require(self, "airspeed_m_s", "m/s", self.airspeed_m_s > 0.0, "a speed above 0 m/s")
@@ -257,7 +247,6 @@ class Loop:
     heading_rad: float = 0.0
     height_m: float = 60.0
     wind_e_m_s: tuple[float, float, float] = CALM
-    phase: ClassVar[Phase] = Phase.FLYING
 
     def __post_init__(self) -> None:
         _require(self, "pitch_rate_rad_s", "rad/s", self.pitch_rate_rad_s != 0.0, "a rate other than 0 rad/s")
@@ -306,12 +295,12 @@ def motion_rows(motion: Motion, n_ticks: int, dt_s: float, latitude_rad: float) 
         omega_b, force_b = inertial_rate_and_force(motion, t_s + 0.5 * dt_s * (float(node) - 1.0), latitude_rad)
         rows["imu_omega_b_rad_s"] += weight * omega_b
         rows["imu_force_b_m_s2"] += weight * force_b
-    rows["wind_e_m_s"] = motion.wind_e_m_s
+    rows["wind_e_m_s"] = getattr(motion, "wind_e_m_s", CALM)
     u, v, w = np.einsum("nij,ni->jn", at.R_eb, at.v_e_m_s - rows["wind_e_m_s"])
     rows["airspeed_m_s"] = airspeed = np.sqrt(u * u + v * v + w * w)
     rows["alpha_rad"] = np.arctan2(w, u)
     rows["beta_rad"] = np.arcsin(np.divide(v, airspeed, out=np.zeros(n_ticks), where=airspeed > 0.0))
-    rows["phase"] = motion.phase
+    rows["phase"] = getattr(motion, "phase", Phase.FLYING)
     rows["rotor_rpm"] = getattr(motion, "rotor_rpm", 0.0)
     return rows
 

@@ -14,7 +14,7 @@ import numpy as np
 from estimator.interface import Array
 from estimator.rotation import from_euler
 from sim.log import Phase
-from sim.motion.prescribed_plant import CALM, Kinematics
+from sim.motion.prescribed_plant import Kinematics
 
 # Body axis and angle of each turn; the axes x, y, z start north, east, down (magnetic).
 _PARTS = ((1, 2.0 * math.pi), (2, 0.5 * math.pi), (0, 2.0 * math.pi), (1, 0.5 * math.pi), (2, 2.0 * math.pi))
@@ -33,7 +33,6 @@ class TurnTable:
     quarter_s: float = 5.0
     height_m: float = 1.0
     phase: ClassVar[Phase] = Phase.HELD
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def __post_init__(self) -> None:
         for name in ("circle_s", "quarter_s"):

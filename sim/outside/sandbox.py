@@ -8,7 +8,6 @@ One child serves many calls and is restarted if it dies.  It ends with this proc
 
 import atexit
 import contextlib
-import ctypes
 import importlib
 import io
 import os
@@ -21,9 +20,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from sim.outside.processes import die_with_parent
+
 LONGEST_S = 60.0
 MEMORY, PER_BYTE = 1 << 30, 10  # bytes of memory, and additional ones per byte of the file
-_PR_SET_PDEATHSIG = 1
 _FRAME = 8  # bytes of the length of a request
 _SAFE = {  # types allowed in an answer, besides those built into pickle
     "numpy": ("dtype", "ndarray"),
@@ -168,8 +168,7 @@ def serve(parent: int) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no core dumps
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    die_with_parent()
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # output of a reader must not mix with the answers
     while os.name != "posix" or os.getppid() == parent:

@@ -65,23 +65,17 @@ class _Part(NamedTuple):
     axes: int
     bias: float
     spikes: tuple[float, float]  # amplitude, fraction of the readings
+    full_scale: str = ""  # field of the part's parameters
 
 
 _GYRO, _ACCELEROMETER, _MAGNETOMETER, _AIRSPEED, _BAROMETER, _GPS = range(6)
 _PARTS: Final = {
-    "gyro": _Part(_GYRO, "deg/s", math.radians(1.0), 3, 5.0, (200.0, 0.02)),
-    "accelerometer": _Part(_ACCELEROMETER, "g", G_M_S2, 3, 0.2, (2.0, 0.02)),
-    "magnetometer": _Part(_MAGNETOMETER, "uT", 1.0, 3, 10.0, (50.0, 0.1)),
-    "airspeed": _Part(_AIRSPEED, "m/s", 1.0, 1, 3.0, (10.0, 0.1)),
-    "barometer": _Part(_BAROMETER, "m", 1.0, 1, 10.0, (50.0, 0.1)),
+    "gyro": _Part(_GYRO, "deg/s", math.radians(1.0), 3, 5.0, (200.0, 0.02), "range_deg_s"),
+    "accelerometer": _Part(_ACCELEROMETER, "g", G_M_S2, 3, 0.2, (2.0, 0.02), "range_g"),
+    "magnetometer": _Part(_MAGNETOMETER, "uT", 1.0, 3, 10.0, (50.0, 0.1), "range_ut"),
+    "airspeed": _Part(_AIRSPEED, "m/s", 1.0, 1, 3.0, (10.0, 0.1), "range_pa"),
+    "barometer": _Part(_BAROMETER, "m", 1.0, 1, 10.0, (50.0, 0.1), "range_pa"),
     "gps": _Part(_GPS, "m", 1.0, 1, 0.0, (50.0, 0.1)),
-}
-_FULL_SCALES: Final = {
-    "gyro": "range_deg_s",
-    "accelerometer": "range_g",
-    "magnetometer": "range_ut",
-    "airspeed": "range_pa",
-    "barometer": "range_pa",
 }
 _AIR: Final = ("airspeed", "barometer")
 _OF_READINGS: Final = ("stuck", "dropout", "nan", "spikes", "bias", "gain", "saturated")
@@ -187,8 +181,9 @@ def require_possible(fault: Fault, suite: Any) -> None:
     part = getattr(suite, fault.part)
     if part is None:
         raise ValueError(f"fault {fault}: no {fault.part} fitted; choose a suite that has one")
-    if fault.kind == "saturated" and not math.isfinite(getattr(part, _FULL_SCALES[fault.part])):
-        field = f"{fault.part}.{_FULL_SCALES[fault.part]}"
+    full_scale = _PARTS[fault.part].full_scale
+    if fault.kind == "saturated" and not math.isfinite(getattr(part, full_scale)):
+        field = f"{fault.part}.{full_scale}"
         raise ValueError(
             f"fault {fault}: this {fault.part} has no full scale; set {field} to a finite number of "
             f"{params.unit_of(field)}, choose a suite whose {fault.part} has one, or use bias"

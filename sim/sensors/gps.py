@@ -18,7 +18,7 @@ from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.clock import Rates
 from sim.place import metres_per_degree
-from sim.sensors.noise import Source, gauss_markov, lag_weights, require
+from sim.sensors.noise import Source, gauss_markov, lag_weights, require, require_choice, require_positive
 
 Resolution = Literal["none", "nmea", "binary"]
 Course = Literal["velocity", "positions"]
@@ -89,17 +89,10 @@ class GpsParams:
         )  # fmt: skip
         require(self, "wander_s", "velocity_wander_s", "outage_s", "jump_decay_s", least=0.001)
         require(self, "rate_hz", least=0.1)
-        for name in ("outage_every_s", "jump_every_s"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"GpsParams.{name} = {getattr(self, name)!r} s: choose a number above 0, or infinity")
-        for name, choices in (
-            ("resolution", get_args(Resolution)),
-            ("course", get_args(Course)),
-            ("minute_decimals", (4, 5)),
-        ):
-            if getattr(self, name) not in choices:
-                possible = ", ".join(str(c) for c in choices)
-                raise ValueError(f"GpsParams.{name} = {getattr(self, name)!r}: choose one of {possible}")
+        require_positive(self, "outage_every_s", "jump_every_s")
+        require_choice(self, "resolution", *get_args(Resolution))
+        require_choice(self, "course", *get_args(Course))
+        require_choice(self, "minute_decimals", 4, 5)
 
 
 UNIT = np.dtype(

@@ -53,6 +53,19 @@ def require_triple(params: Any, *names: str) -> None:
             _refuse(params, name, "three finite numbers")
 
 
+def require_positive(params: Any, *names: str) -> None:
+    """Check that fields of `params` are above 0, or infinite: ValueError."""
+    for name in names:
+        if not getattr(params, name) > 0.0:
+            _refuse(params, name, "a number above 0, or infinity")
+
+
+def require_choice(params: Any, name: str, *choices: Any) -> None:
+    """Check that a field of `params` is one of `choices`: ValueError."""
+    if getattr(params, name) not in choices:
+        _refuse(params, name, f"one of {', '.join(map(str, choices))}", unit="")
+
+
 def require_converter(params: Any, name: str) -> None:
     """Check the full scale (field `name`) and the number of `bits` of a converter: ValueError."""
     if params.bits not in range(MOST_BITS + 1):
@@ -64,28 +77,23 @@ def require_converter(params: Any, name: str) -> None:
 
 def require_device(params: Any) -> None:
     """Check bandwidth, number of conversions and kind of output of an inertial sensor: ValueError."""
-    if not params.bandwidth_hz > 0.0:
-        _refuse(params, "bandwidth_hz", "a number above 0, or infinity")
+    require_positive(params, "bandwidth_hz")
     if params.conversions not in range(MOST_CONVERSIONS + 1):
         _refuse(params, "conversions", f"a whole number from 1 to {MOST_CONVERSIONS}, or 0 for a continuous mean")
-    if params.output not in get_args(Output):
-        _refuse(params, "output", ", ".join(get_args(Output)))
+    require_choice(params, "output", *get_args(Output))
 
 
 def require_scale(params: Any, range_name: str, step_name: str) -> None:
     """Check that a full scale is above 0 (infinite: no limit) and a converter step within it: ValueError."""
-    full_scale, step = getattr(params, range_name), getattr(params, step_name)
-    if not full_scale > 0.0:
-        _refuse(params, range_name, "a number above 0, or infinity")
-    if not 0.0 <= step <= full_scale or math.isinf(step):
+    require_positive(params, range_name)
+    step = getattr(params, step_name)
+    if not 0.0 <= step <= getattr(params, range_name) or math.isinf(step):
         _refuse(params, step_name, "a step within the range, or 0 for no converter")
 
 
-_UNIT_WORDS = {"bits": "bit", "conversions": "per sample", "output": ""}  # where the name does not end in a unit
-
-
-def _refuse(params: Any, name: str, choose: str) -> NoReturn:
-    unit = _UNIT_WORDS.get(name) if name in _UNIT_WORDS else unit_of(name) or "(a fraction)"
+def _refuse(params: Any, name: str, choose: str, unit: str | None = None) -> NoReturn:
+    if unit is None:
+        unit = "per sample" if name == "conversions" else unit_of(name) or "(a fraction)"
     value = f"{getattr(params, name)!r} {unit}".rstrip()
     raise ValueError(f"{type(params).__name__}.{name} = {value}: choose {choose}")
 

@@ -18,7 +18,7 @@ from sim.clock import Rates
 from sim.log import Log, Phase
 from sim.loop import sense
 from sim.magnetic_field import field_e_ut
-from sim.motion.prescribed_plant import CALM, Kinematics, Motion, PrescribedPlant
+from sim.motion.prescribed_plant import Kinematics, Motion, PrescribedPlant
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
 from sim.rng import stream
 from sim.sensors import accelerometer, allan, gyro
@@ -43,13 +43,12 @@ REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: reached by a first-order lag afte
 class Inertial:
     """Simulation of a gyro or an accelerometer at rest, and the names of its noise parameters.
 
-    unit : of the report      scale : from SI to that unit      columns : of the drawn errors, bias and noise
+    unit : of the report      scale : from SI to that unit
     """
 
     module: Any
     unit: str
     scale: float
-    columns: tuple[str, str]
     density: str
     instability: str
     walk: str
@@ -57,12 +56,10 @@ class Inertial:
 
 INERTIAL: Final = {
     "gyro": Inertial(
-        gyro, "deg/s", math.degrees(1.0), ("gyro_bias_b_rad_s", "gyro_noise_b_rad_s"),
-        "noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s",
+        gyro, "deg/s", math.degrees(1.0), "noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s",
     ),
     "accelerometer": Inertial(
-        accelerometer, "ug", 1e6 / G_M_S2, ("force_bias_b_m_s2", "force_noise_b_m_s2"),
-        "noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s",
+        accelerometer, "ug", 1e6 / G_M_S2, "noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s",
     ),
 }  # fmt: skip
 
@@ -152,7 +149,8 @@ def at_rest(
     def record(flight: int) -> Array:
         noise = np.zeros(n, list(how.module.NOISE))
         how.module.draw(params, BoardParams(), rates, partial(stream, SEED, flight), noise)
-        signal = how.scale * (noise[how.columns[0]] + noise[how.columns[1]])
+        bias, white = (name for name, *_ in how.module.NOISE)
+        signal = how.scale * (noise[bias] + noise[white])
         return allan.variance(signal, m)
 
     found = []
@@ -191,8 +189,6 @@ class Exercise:
 
     pull_m_s2: float = 1.5 * G_M_S2
     roll_rad_s: float = math.radians(120.0)
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
     seconds: ClassVar[float] = 7.0
 
     def at(self, t_s: Array) -> Kinematics:
@@ -225,8 +221,6 @@ class SpeedStep:
     when_s: float
     before_m_s: float = 5.0
     after_m_s: float = 15.0
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
@@ -242,8 +236,6 @@ class QuarterTurn:
     when_s: float
     speed_m_s: float = 12.0
     rate_rad_s: float = math.radians(45.0)
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
@@ -380,7 +372,6 @@ class Spin:
 
     rate_rad_s: float = 2.0 * math.pi / 20.0
     phase: ClassVar[Phase] = Phase.HELD
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""
@@ -403,9 +394,6 @@ def turn_around(params: MagnetometerParams) -> MagneticTrial:
 @dataclass(frozen=True, slots=True)
 class Surge:
     """North, nose level: airspeed 12 +- 5 m/s and height 60 +- 10 m, with a period of 20 s."""
-
-    phase: ClassVar[Phase] = Phase.FLYING
-    wind_e_m_s: ClassVar[tuple[float, float, float]] = CALM
 
     def at(self, t_s: Array) -> Kinematics:
         """See `Motion.at`."""

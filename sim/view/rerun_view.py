@@ -54,25 +54,17 @@ _FOOTER = 32  # bytes: offset and length of the index, its checksum, ``RRF2FOOT`
 _FLUSH_S = 120.0  # limit for encoding
 _CHASE_S = 1.5  # smoothing time of the path that the chase view follows
 _LANES = {"phase": ("truth", "phase", Phase), "mode": ("flown", "mode", Mode), "estimator": ("flown", "health", Health)}
+_IDLE, _WARNING, _ALARM, _OK = (90, 95, 105), (190, 140, 50), (180, 60, 60), (50, 125, 80)
 _LANE_COLOURS: dict[str, dict[str, Colour]] = {
-    "phase": {"held": (90, 95, 105), "thrown": (190, 140, 50), "flying": (45, 110, 125), "resting": (90, 95, 105)},
+    "phase": {"held": _IDLE, "thrown": _WARNING, "flying": (45, 110, 125), "resting": _IDLE},
     # Manual grey, attitude modes blue, navigation green; failsafes amber, red if the attitude is unknown.
     "mode": {
-        "manual": (90, 95, 105),
-        "rate": (110, 105, 130),
-        "stabilise": (60, 95, 140),
-        "course": (45, 110, 90),
-        "return": (50, 125, 80),
-        "launch": (45, 110, 125),
-        "loiter": (70, 120, 60),
-        "waypoints": (60, 125, 100),
-        "circle": (190, 140, 50),
-        "glide": (170, 105, 40),
-        "level": (180, 60, 60),
-        "low": (200, 120, 60),
+        "manual": _IDLE, "rate": (110, 105, 130), "stabilise": (60, 95, 140), "course": (45, 110, 90), "return": _OK,
+        "launch": (45, 110, 125), "loiter": (70, 120, 60), "waypoints": (60, 125, 100), "circle": _WARNING,
+        "glide": (170, 105, 40), "level": _ALARM, "low": (200, 120, 60),
     },
-    "estimator": {"starting": (90, 95, 105), "good": (50, 125, 80), "poor": (180, 60, 60)},
-}
+    "estimator": {"starting": _IDLE, "good": _OK, "poor": _ALARM},
+}  # fmt: skip
 
 
 def write(flight: Flight, path: str | Path) -> Path:

@@ -254,8 +254,8 @@ def test_story_names_the_flight_and_every_line_of_its_verdict(flight):
     told = story(replace(flight, manifest={**flight.manifest, "verdict": ROWS}))
     assert "hand_launch, endurance, premerlani" in told
     assert "seed 1" in told
-    assert "| inclination error RMS | 3.21 deg | <= 4 deg | passed |" in told
-    assert "| height at 20 s | not measured | >= 10 m | **FAILED** |" in told
+    assert "| inclination error RMS | 3.21 deg | ≤ 4 deg | pass |" in told
+    assert "| height at 20 s | not measured | ≥ 10 m | **FAIL** |" in told
 
 
 def test_blueprint_is_embedded(shown):

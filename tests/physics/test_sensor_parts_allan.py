@@ -30,7 +30,8 @@ def drawn(kind, params, flight):
     how, rates = INERTIAL[kind], Rates(imu_hz=IMU_HZ)
     noise = np.zeros(rates.ticks(HOUR_S), list(how.module.NOISE))
     how.module.draw(params, BoardParams(), rates, partial(stream, SEED, flight), noise)
-    signal = how.scale * (noise[how.columns[0]] + noise[how.columns[1]])
+    bias, white = (name for name, *_ in how.module.NOISE)
+    signal = how.scale * (noise[bias] + noise[white])
     return signal - signal.mean(axis=0)
 
 

@@ -478,14 +478,14 @@ def test_manifest_holds_the_hash_of_the_library(example):
 
 
 def test_every_command_takes_a_library(example, in_process, capsys):
-    """fly, check, compare, replay and bench, with a parameter in the spelling of each."""
+    """fly, check, compare, replay and bench, with the same spelling of a parameter."""
     spec, short = "./complementary.so", ["--set", "duration_s=3"]
-    assert run(["fly", "crosswind", "--estimator", spec, *short, "--set", "estimator_params.tilt_s=9"]) in (0, 1)
+    assert run(["fly", "crosswind", "--estimator", spec, *short, "--set", "complementary.tilt_s=9"]) in (0, 1)
     manifest = json.loads(Path("flights/crosswind-complementary-seed0/manifest.json").read_text())
     assert manifest["config"]["estimator_params"] == {"tilt_s": 9}
     assert run(["check", "crosswind", "--seeds", "0-1", "--workers", "1", "--estimator", spec, *short]) in (0, 1)
     compared = ["compare", "crosswind", "--seeds", "0", "--workers", "1", "--estimators", f"{spec},gyro_only"]
-    assert run([*compared, "--set", "estimator_params.complementary.tilt_s=9", *short]) == 0
+    assert run([*compared, "--set", "complementary.tilt_s=9", *short]) == 0
     replayed = ["replay", "flights/crosswind-complementary-seed0", "--estimator", f"{spec},gyro_only"]
     assert run([*replayed, "--no-rerun", "--settle", "0", "--set", "complementary.tilt_s=9", "--json", "r.json"]) == 0
     assert json.loads(Path("r.json").read_text())["estimators"]["complementary"]["heading_reference"] == "course"

@@ -4,7 +4,7 @@
  * gyros, plus a small correction towards the two references; the tilt error, integrated, is the gyro bias.
  *
  *     cc -O2 -shared -fPIC -I"$(python -m wingslevel.include)" complementary.c -o complementary.so -lm
- *     wingslevel fly crosswind --estimator ./complementary.so
+ *     wingslevel fly crosswind --estimator ./complementary.so --set complementary.tilt_s=10
  *
  * MIT licence.
  */

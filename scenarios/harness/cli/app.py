@@ -241,16 +241,16 @@ def compare(
 def claims(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Claims, or patterns such as offset*. [default: all]", autocompletion=complete.claims),
+        typer.Argument(help="Claims, or patterns such as offset*; by default all.", autocompletion=complete.claims),
     ] = None,
     seeds: Annotated[
-        str | None, typer.Option(metavar="LIST", help="Seeds: 0-9 or 0,2,5-7. [default: as many as each claim needs]")
+        str | None, typer.Option(metavar="LIST", help="Seeds: 0-9 or 0,2,5-7; by default those of each claim.")
     ] = None,
     workers: WorkersOption = None,
     flight_timeout: FlightTimeoutOption = None,
     list_only: Annotated[bool, typer.Option("--list", help="List the claims without testing them.")] = False,
     pictures: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw pictures. [default: images/ beside the Markdown]")
+        Path | None, typer.Option(metavar="FOLDER", help="Draw pictures; by default in images/ beside the Markdown.")
     ] = None,
     markdown: MarkdownOption = None,
     json_: JsonOption = None,

@@ -218,11 +218,19 @@ def verdict_table(title: str, rows: Sequence["Row"]) -> "Grid":
     grid.column("check", wraps=True)
     for heading, right in (("measured", True), ("limit", True), ("unit", False), ("", False)):
         grid.column(heading, right=right)
-    for row in rows:
+    measured = _at_the_point([row.figure for row in rows])
+    limits = _at_the_point([f"{row.sense} {limit_figures(row.limit)}" for row in rows])
+    for row, value, limit in zip(rows, measured, limits, strict=True):
         word = Text("pass", "green") if row.passed else Text("FAIL", "bold red")
         name = printable(f"{row.name} ({row.note})" if row.note else row.name)
-        grid.row([name, row.figure, f"{row.sense} {limit_figures(row.limit)}", printable(row.unit), word])
+        grid.row([name, value, limit, printable(row.unit), word])
     return grid
+
+
+def _at_the_point(numbers: Sequence[str]) -> list[str]:
+    """`numbers`, padded on the right so that their decimal points line up in a right-aligned column."""
+    behind = [len(text) - text.find(".") if "." in text else 0 for text in numbers]
+    return [text + " " * (max(behind, default=0) - n) for text, n in zip(numbers, behind, strict=True)]
 
 
 def claim_table(title: str, lines: Sequence[tuple[str, "Text", str]]) -> "Grid":
