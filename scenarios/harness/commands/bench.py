@@ -44,7 +44,7 @@ _NS_PER_US = 1e3
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """What was measured.
+    """The measurements.
 
     bare_us, closed_us : per tick, least of the repeats           median_ratio : over the pairs
     stages_us : per tick, by stage, recording included            update_ns : the estimator's `update`, per call
@@ -68,7 +68,7 @@ class Speed:
 
     @property
     def rows(self) -> list[Row]:
-        """What is demanded, with its limit."""
+        """The requirements, with their limits."""
         rows = [
             _limited("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
             _limited(f"{self.estimator}: update()", "ns", self.update_ns, UPDATE_LIMIT_NS),
@@ -79,11 +79,11 @@ class Speed:
 
     @property
     def passed(self) -> bool:
-        """Whether all of it is fast enough."""
+        """Whether all requirements are met."""
         return all(row.passed for row in self.rows)
 
     def to_json(self) -> dict[str, Any]:
-        """The figures by name, each with its unit in it."""
+        """The values by name; names include the unit."""
         return {
             "passed": self.passed,
             "closed_loop_ratio": self.ratio,
@@ -153,7 +153,7 @@ class Cruise:
         return (end_ns - begin_ns) / (last - first) / _NS_PER_US
 
     def whole(self, flight: Flight) -> None:
-        """Refuse to time what did not fly to its end."""
+        """NotTimed if the flight did not reach its end."""
         if flight.outcome == Outcome.INTERRUPTED:
             raise KeyboardInterrupt
         if flight.outcome != Outcome.COMPLETED:
@@ -217,7 +217,7 @@ class Cruise:
 
 
 def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
-    """Measure with `estimator` aboard: `repeats` pairs of `seconds` of simulated flight.
+    """Measure with `estimator`: `repeats` pairs of `seconds` of simulated flight.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from sim.sensors.fitting import suite_params
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """What is to be written of the recording `flight`: the bytes for each file, by format.
+    """The export of the recording `flight`: the bytes for each file, by format.
 
     rows : of its text log
     """
@@ -105,7 +105,7 @@ def make_of(
 
 
 def _require_apart(nmea: Path | None, ubx: Path | None, csv: Path | None) -> None:
-    """Require that something is to be written, each in a file of its own: ValueError."""
+    """ValueError unless there is a file to write, and each is named only once."""
     if nmea is None and ubx is None and csv is None:
         raise ValueError("nothing to write: name --nmea FILE, --ubx FILE, --csv FILE or several of them")
     named: dict[Path, str] = {}
@@ -114,7 +114,7 @@ def _require_apart(nmea: Path | None, ubx: Path | None, csv: Path | None) -> Non
         if path is None:
             continue
         if path.resolve() in named:
-            raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: each needs a file of its own")
+            raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: use separate files")
         named[path.resolve()] = option
 
 
@@ -131,7 +131,7 @@ def map_of(csv: Path) -> Path:
 
 
 def accuracy_of(flight: Flight) -> Accuracy:
-    """What the receiver of `flight` may say of itself: the sigmas of its errors, unknown without a configuration."""
+    """The accuracies that the receiver of `flight` reports: the sigmas of its errors; unknown without a config."""
     config = flight.manifest.get("config")
     if config is None:
         return Accuracy()
