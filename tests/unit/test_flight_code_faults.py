@@ -295,7 +295,8 @@ def test_entry_point_that_raises_is_refused_with_the_line_of_its_package(
     point = EntryPoint("theirs", f"offered_{raised}:Mine", "wingslevel.estimators")
     monkeypatch.setattr(entry_points, "entry_points", lambda group: [point] if group == point.group else [])
     number = 1 + own("import", raised).splitlines().index(RAISED[raised][1])
-    with pytest.raises(plugins.PluginError, match=rf"estimator 'theirs' of an installed package: .* \(__init__\.py, line {number}\)$"):
+    line = rf"estimator 'theirs' of an installed package: .* \(__init__\.py, line {number}\)$"
+    with pytest.raises(plugins.PluginError, match=line):
         load_estimator("theirs")
 
 
