@@ -149,21 +149,21 @@ def replay(
     flown = Log.empty(len(log.rows))
     _truth_of(log, flown.truth)
     flown.measured[:] = log.rows
-    failure, ns_per_update, said = "", math.nan, _Said(known, None, {})
+    failure, ns_per_update, reported = "", math.nan, _Reported(known, None, {})
     try:
         ns_per_update = _run(estimator, on_ground, log.rows, first, flown.flown, advance)
     except FlightCodeFailed as failed:
         failure = str(failed)
     try:
-        said = _said(estimator, known, float(log.rows["t_s"][-1]))
+        reported = _reported(estimator, known, float(log.rows["t_s"][-1]))
     except (FlightCodeFailed, PluginError) as failed:
         failure = failure or str(failed)
     judged = judged_rows(log, window, first)
     scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
     ns_per_update = math.nan if failure else ns_per_update
     return Replayed(
-        short_name(spec), reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
-        said.refused,
+        short_name(spec), reference, flown, first, ns_per_update, reported.rejected, scores, failure, reported.known,
+        reported.refused,
     )  # fmt: skip
 
 
@@ -184,7 +184,7 @@ def _all_of(withheld: Sequence[str]) -> bool:
     return set(withheld) >= set(PROPERTIES)
 
 
-class _Said(NamedTuple):
+class _Reported(NamedTuple):
     """What an estimator reports after a replay."""
 
     known: Mapping[str, Known]
@@ -192,7 +192,7 @@ class _Said(NamedTuple):
     refused: Mapping[str, int]
 
 
-def _said(estimator: object, known: Mapping[str, Known], t_s: float) -> _Said:
+def _reported(estimator: object, known: Mapping[str, Known], t_s: float) -> _Reported:
     """What `estimator` reports after its replay; FlightCodeFailed or PluginError if that is invalid."""
     told = learnt(estimator, known)
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, t_s):
@@ -201,7 +201,7 @@ def _said(estimator: object, known: Mapping[str, Known], t_s: float) -> _Said:
         if not isinstance(refused, Mapping) or len(refused) > MOST_REFUSED:
             raise Refused(f"refused is {shown(refused)}, must be numbers of samples by instrument")
         counts = {printable(str(name)): _count(f"refused[{shown(name)}]", n) for name, n in refused.items()}
-        return _Said(told, None if rejected is None else _count("rejected", rejected), counts)
+        return _Reported(told, None if rejected is None else _count("rejected", rejected), counts)
 
 
 def _count(name: str, value: object) -> int:

@@ -21,7 +21,7 @@ from sim.outside.signals import Interrupted, TimedOut, check, heard, listening
 from sim.outside.wording import class_name, described, printable
 
 TRACEBACK = "WINGSLEVEL_TRACEBACK"  # environment variable: 1 shows full tracebacks, in workers too
-_PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
+_PACKAGES = ("estimator", "autopilot", "sim", "scenarios", "wingslevel")
 _ROOT = Path(__file__).resolve().parents[2]
 _NOT_THEIRS = tuple(
     f"{path}{os.sep}"
@@ -34,20 +34,17 @@ class Refused(ValueError):
     """User code returned something invalid; the message is the text alone, without class and place."""
 
 
+_switch = {"tracebacks": False}
+
+
 def tracebacks_shown() -> bool:
     """Whether this process shows full tracebacks."""
-    return _Switch.on
-
-
-class _Switch:
-    """Whether this process shows full tracebacks."""
-
-    on = False
+    return _switch["tracebacks"]
 
 
 def show_tracebacks(on: bool) -> None:
     """Write full tracebacks of user code to standard error, besides the one-line message, or not."""
-    _Switch.on = on
+    _switch["tracebacks"] = on
 
 
 class theirs:
@@ -149,7 +146,7 @@ def _is_theirs(frame: FrameType, home: str) -> bool:
 
 def show_traceback(error: BaseException) -> None:
     """Write the traceback of `error` to standard error, if tracebacks are enabled."""
-    if not (_Switch.on or os.environ.get(TRACEBACK) == "1"):
+    if not (tracebacks_shown() or os.environ.get(TRACEBACK) == "1"):
         return
     try:
         text = "".join(traceback.format_exception(error))
