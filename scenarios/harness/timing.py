@@ -9,7 +9,7 @@ import numpy as np
 
 from estimator.instruments import Instruments
 from estimator.interface import Measurements
-from scenarios.harness.plugins import equipped
+from scenarios.harness.equipping import equipped
 from sim.outside.blame import home_of, theirs
 
 REPEATS, MOST_NS = 7, 1_000_000_000
