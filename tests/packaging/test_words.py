@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 import typer
+from rich.text import Text
 
 from scenarios.harness.cli.app import app
 
@@ -66,6 +67,12 @@ def test_help_has_no_translated_phrases() -> None:
     for name, text in help_texts():
         assert text, f"{name} has no help"
         assert not [phrase for phrase in INSTEAD if re.search(phrase, text, re.I)], f"{name}: {text}"
+
+
+def test_help_shows_its_brackets() -> None:
+    """What stands in brackets, such as a default, is text and not markup."""
+    for name, text in help_texts():
+        assert Text.from_markup(text).plain == text.replace("\\[", "["), name
 
 
 @pytest.mark.parametrize(

@@ -141,7 +141,7 @@ def fly(
         int | None,
         typer.Option(
             metavar="N",
-            help="Seed of the flight; the same seed gives the same bits. [default: 0]",
+            help="Seed of the flight; the same seed gives the same bits. \\[default: 0]",
             parser=whole_in(-(10**18), 10**18),
         ),
     ] = None,
@@ -361,7 +361,7 @@ def export(
         Path | None, typer.Option(metavar="FILE", help="Write all measurements as a text log with a column map.")
     ] = None,
     start: Annotated[
-        str | None, typer.Option(metavar="UTC", help="Time of power-up. [default: 2026-07-02T12:00:00]")
+        str | None, typer.Option(metavar="UTC", help="Time of power-up. \\[default: 2026-07-02T12:00:00]")
     ] = None,
     json_: JsonOption = None,
 ) -> None:

@@ -25,7 +25,7 @@ KindArgument = Annotated[
     str | None,
     typer.Argument(help="scenarios, estimators, autopilots, aircraft, suites or parts.", autocompletion=complete.kinds),
 ]
-NamesArgument = Annotated[list[str] | None, typer.Argument(help="Names to list. [default: all of that kind]")]
+NamesArgument = Annotated[list[str] | None, typer.Argument(help="Names to list. \\[default: all of that kind]")]
 ParamsOption = Annotated[bool, typer.Option("--params", help="List the parameters of estimators, for --set.")]
 EstimatorOption = Annotated[
     str | None,
@@ -116,7 +116,7 @@ WebOption = Annotated[bool, typer.Option("--web", help="Use the viewer in a brow
 WorkersOption = Annotated[
     int | None,
     typer.Option(
-        metavar="N", help="Number of processes. [default: as many as processors]", parser=whole_in(1, MOST_WORKERS)
+        metavar="N", help="Number of processes. \\[default: as many as processors]", parser=whole_in(1, MOST_WORKERS)
     ),
 ]
 FlightTimeoutOption = Annotated[
@@ -124,7 +124,7 @@ FlightTimeoutOption = Annotated[
     typer.Option(
         "--flight-timeout",
         metavar="S",
-        help="Wall-clock limit per flight. [default: 600]",
+        help="Wall-clock limit per flight. \\[default: 600]",
         parser=number_in(0.001, 1e6, "s"),
     ),
 ]
@@ -154,7 +154,7 @@ CalibrationOption = Annotated[
     float | None,
     typer.Option(
         metavar="S",
-        help="Seconds averaged at the start for the power-up, if at rest; 0 is none. [default: 2]",
+        help="Seconds averaged at the start for the power-up, if at rest; 0 is none. \\[default: 2]",
         parser=number_in(-1e6, 1e6, "s"),
     ),
 ]
@@ -169,7 +169,7 @@ UnitOption = Annotated[
 SeveralOption = Annotated[
     str | None,
     typer.Option(
-        "--estimators", metavar="A,B,C", help="Estimators to compare. [default: all]",
+        "--estimators", metavar="A,B,C", help="Estimators to compare. \\[default: all]",
         autocompletion=complete.estimators,
     ),
 ]  # fmt: skip
