@@ -8,6 +8,7 @@ GPS, or with a limit of 0), after a settling time.  Against firmware every row c
 from the first sample.
 """
 
+import copy
 import math
 import operator
 import time
@@ -27,15 +28,7 @@ from scenarios.harness.config import literal
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.logs.validity import INTERVALS, LONGEST_S, latest
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import (
-    Equipped,
-    Maker,
-    PluginError,
-    equipped,
-    heading_reference_of,
-    learnt,
-    short_name,
-)
+from scenarios.harness.plugins import Equipped, Maker, PluginError, equipped, heading_reference_of, learnt, short_name
 from sim.events import events_of
 from sim.flight_code import FlightCodeFailed, blaming, estimate_of, record_estimates
 from sim.log import Event, Flight, Log, Outcome, Phase
@@ -55,6 +48,7 @@ SCORES = (
     "inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg", "heading_rms_deg",
     "rotation_rms_deg", "rotation_max_deg",
 )  # fmt: skip
+_NO_SCORES = dict.fromkeys(SCORES, math.nan)
 MOST_REFUSED = 100  # kinds of rejected samples that an estimator may report
 SHARE_S, REPEATS = 0.3, 7  # the least time of several runs counts, within this total
 
@@ -102,15 +96,13 @@ class Replayed:
     def to_json(self) -> dict[str, Any]:
         """The numbers, named with their units; None for those that could not be measured."""
         numbers = {**self.scores, "ns_per_update": self.ns_per_update}
-        plain: dict[str, Any] = {name: v if math.isfinite(v) else None for name, v in numbers.items()}
-        failure = {"failure": self.failure} if self.failure else {}
         return {
-            **plain,
+            **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
             "rejected": self.rejected,
             "refused": dict(self.refused),
             "heading_reference": self.heading_reference,
             "known": to_json(self.known),
-            **failure,
+            **({"failure": self.failure} if self.failure else {}),
         }
 
 
@@ -166,18 +158,14 @@ def replay(
     except (FlightCodeFailed, PluginError) as failed:
         failure = failure or str(failed)
     judged = judged_rows(log, window, first)
-    scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
-    ns_per_update = math.nan if failure else ns_per_update
-    return Replayed(
-        short_name(spec), reference, flown, first, ns_per_update, said.rejected, scores, failure, said.known,
-        said.refused,
-    )  # fmt: skip
+    scores, spent = (_NO_SCORES, math.nan) if failure else (score(flown.flown["R_eb"], log, judged), ns_per_update)
+    about = short_name(spec), reference, flown, first
+    return Replayed(*about, spent, said.rejected, scores, failure, said.known, said.refused)
 
 
 def gone(spec: str | Maker, failure: str) -> Replayed:
     """The result for an estimator that ended the process: no rows, and the failure."""
-    scores = dict.fromkeys(SCORES, math.nan)
-    return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, scores, failure)
+    return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, _NO_SCORES, failure)
 
 
 def known_to(log: RecordedLog, withheld: Sequence[str] = ()) -> Instruments:
@@ -259,12 +247,9 @@ def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bo
     if "gps" in log.sensors and window.airborne_m_s > 0.0:
         judged &= flying(rows, window.airborne_m_s)
         if not judged.any():
+            slow = f"ground speed never above {window.airborne_m_s:g} m/s while there is a reference"
             fastest = float(rows["gps_speed_m_s"][rows["gps_new"] > 0].max(initial=0.0))
-            why = (
-                f"ground speed never above {window.airborne_m_s:g} m/s while there is a reference (fastest fix: "
-                f"{fastest:.1f} m/s); --airborne 0 judges all rows"
-            )
-            return judged, why
+            return judged, f"{slow} (fastest fix: {fastest:.1f} m/s); --airborne 0 judges all rows"
     judged &= np.arange(len(rows)) >= first
     if judged.any():
         judged &= rows["t_s"] > rows["t_s"][np.argmax(judged)] + window.settle_s
@@ -307,7 +292,7 @@ def score(R_eb: Array, log: RecordedLog, judged: NDArray[np.bool_]) -> dict[str,
     The heading is compared with the reference's nose, where its nose is not near the vertical.
     """
     if log.reference is None:
-        return dict.fromkeys(SCORES, math.nan)
+        return _NO_SCORES
     ours, theirs = R_eb[judged], log.reference.R_eb[judged]
     inclination = np.degrees(inclination_error_rad(ours, theirs))
     rotation = np.degrees(rotation_error_rad(ours, theirs))
@@ -383,7 +368,7 @@ def _run(
     rows.flags.writeable = writeable  # kernels are compiled for it
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
         replay = getattr(estimator, "replay", None)
-    power_up(estimator, _copied(on_ground))
+    power_up(estimator, copy.deepcopy(on_ground))
     if replay is None:
         began = time.perf_counter()
         for k in range(first, total):
@@ -399,7 +384,7 @@ def _run(
         replay(rows[first : first + 1])  # compiles, if necessary
     spent, least = 0.0, math.inf
     for i in range(REPEATS):
-        power_up(estimator, _copied(on_ground))
+        power_up(estimator, copy.deepcopy(on_ground))
         with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
             began = time.perf_counter()
             estimates = replay(rows[first:])
@@ -414,14 +399,6 @@ def _run(
         flown[first + good] = Log.empty(1).flown[0]
         raise FlightCodeFailed(Outcome.ESTIMATOR_FAILED, estimator, float(rows["t_s"][first + good]), fault)
     return 1e9 * least / (total - first)
-
-
-def _copied(on_ground: ImuSample | None) -> ImuSample | None:
-    if on_ground is None:
-        return None
-    return on_ground._replace(
-        gyro_b_rad_s=np.array(on_ground.gyro_b_rad_s), force_b_m_s2=np.array(on_ground.force_b_m_s2)
-    )
 
 
 def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:

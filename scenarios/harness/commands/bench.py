@@ -1,9 +1,9 @@
 """Speed: the closed loop against bare JSBSim, stage by stage, and the estimator alone.
 
-The closed loop is `sim.loop.fly` itself in still air, timed from simulated second to simulated second, so that what
-happens once (trim, drawing the noise) is left out and what happens every tick is not.  Bare is the same plant object,
-in the same state, running the same physics with its commands left as they are.  The two alternate in one process;
-the ratio of the two minima is the figure, the median over the pairs shows how quiet the machine was.
+The closed loop is `sim.loop.fly` in still air, timed from the first simulated second to the last, which leaves out the
+start (trim, drawing the noise).  Bare JSBSim is the same plant in the same state with constant commands.  The two
+alternate in one process.  The result is the ratio of their minima; the median over the pairs shows how much other
+programs disturbed the measurement.
 """
 
 import platform
@@ -18,13 +18,13 @@ from rich.text import Text
 from autopilot.interface import NEUTRAL, Autopilot, Mode, Setpoint
 from autopilot.pilot import Script, Timed
 from estimator.instruments import Instruments
-from estimator.interface import AttitudeEstimator, Measurements
+from estimator.interface import AttitudeEstimator
 from scenarios.harness.checks import Row
 from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.gate import guard
 from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
-from scenarios.harness.timing import least_ns
+from scenarios.harness.timing import Cost, NotTimed, cost_of, least_ns
 from scenarios.harness.verdict import FAILED, SIMULATION_FAILED
 from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.clock import Rates
@@ -69,13 +69,16 @@ class Speed:
     @property
     def rows(self) -> list[Row]:
         """What is demanded, with its limit."""
-        rows = [
-            _limited("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
-            _limited(f"{self.estimator}: update()", "ns", self.update_ns, UPDATE_LIMIT_NS),
+        demands = (
+            ("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
+            (f"{self.estimator}: update()", "ns", self.update_ns, UPDATE_LIMIT_NS),
+            (f"{self.estimator}: kernel", "ns", self.kernel_ns, KERNEL_LIMIT_NS),
+        )
+        return [
+            Row(name, unit, value, "<=", limit, value <= limit)
+            for name, unit, value, limit in demands
+            if value is not None
         ]
-        if self.kernel_ns is not None:
-            rows.append(_limited(f"{self.estimator}: kernel", "ns", self.kernel_ns, KERNEL_LIMIT_NS))
-        return rows
 
     @property
     def passed(self) -> bool:
@@ -99,18 +102,6 @@ class Speed:
             "python": platform.python_version(),
             "machine": platform.machine(),
         }
-
-
-def _limited(name: str, unit: str, value: float, limit: float) -> Row:
-    return Row(name, unit, value, "<=", limit, value <= limit)
-
-
-class NotTimed(RuntimeError):
-    """A flight that did not last, or flight code that failed while it was timed; `exit_code` as for a flight."""
-
-    def __init__(self, why: str, exit_code: int = FAILED) -> None:
-        super().__init__(why)
-        self.exit_code = exit_code
 
 
 _BENCHMARK = "the benchmark"
@@ -146,14 +137,13 @@ class Cruise:
         def watch(log: Log, n_rows: int) -> None:  # noqa: ARG001 - as the loop calls it
             marks.append((n_rows, perf_counter_ns()))
 
-        self.whole(
-            fly(self.plant, self.suite, *self.pilots(), Script([Timed(0.0, self.setpoint)]), self.log, watch=watch)
-        )
+        script = Script([Timed(0.0, self.setpoint)])
+        self.whole(fly(self.plant, self.suite, *self.pilots(), script, self.log, watch=watch))
         (first, begin_ns), (last, end_ns) = marks[0], marks[-1]
         return (end_ns - begin_ns) / (last - first) / _NS_PER_US
 
     def whole(self, flight: Flight) -> None:
-        """Refuse to time what did not fly to its end."""
+        """Raise `NotTimed` if the flight ended early."""
         if flight.outcome == Outcome.INTERRUPTED:
             raise KeyboardInterrupt
         if flight.outcome != Outcome.COMPLETED:
@@ -188,32 +178,14 @@ class Cruise:
             for i, spent in enumerate((t1 - t0, t2 - t1, t3 - t2, clock() - t3)):
                 total[i] += spent
         per_reading = least_ns(lambda: [clock() for _ in range(1000)]) / 1000
-        return {
-            stage: (spent / len(self.log) - per_reading) / _NS_PER_US
-            for stage, spent in zip(STAGES, total, strict=True)
-        }
+        per_tick = [(spent / len(self.log) - per_reading) / _NS_PER_US for spent in total]
+        return dict(zip(STAGES, per_tick, strict=True))
 
-    def update_ns(self) -> float:
-        """`update` over the measurements of the last flight, nanoseconds a call."""
+    def cost(self) -> Cost:
+        """Cost of an update of the estimator alone, over the measurements of the last flight."""
         estimator, _ = self.pilots()
-        rows = self.log.measured.copy()
-        inputs = [Measurements(rows, k) for k in range(len(rows))]
-
-        def run() -> None:
-            update = estimator.update
-            for m in inputs:
-                update(m)
-
         with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
-            return least_ns(run) / len(inputs)
-
-    def kernel_ns(self) -> float | None:
-        """The kernel over the same measurements in one call, nanoseconds a tick; None if there is none."""
-        estimator, _ = self.pilots()
-        rows = self.log.measured.copy()
-        with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
-            replay = getattr(estimator, "replay", None)
-            return None if replay is None else least_ns(lambda: replay(rows)) / len(rows)
+            return cost_of(estimator, self.log.measured)
 
 
 def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
@@ -242,6 +214,7 @@ def _measured(estimator: str, seconds: float, repeats: int, advance: Callable[[i
         closed.append(cruise.closed_us())
         bare.append(cruise.bare_us())
         advance(i + 1, repeats)
+    cost = cruise.cost()
     by_repeat = [cruise.stages_us() for _ in range(max(3, repeats // 4))]
     return Speed(
         estimator=estimator,
@@ -251,8 +224,8 @@ def _measured(estimator: str, seconds: float, repeats: int, advance: Callable[[i
         closed_us=min(closed),
         median_ratio=statistics.median(c / b for c, b in zip(closed, bare, strict=True)),
         stages_us={stage: min(stages[stage] for stages in by_repeat) for stage in STAGES},
-        update_ns=cruise.update_ns(),
-        kernel_ns=cruise.kernel_ns(),
+        update_ns=cost.update_ns,
+        kernel_ns=cost.replay_ns,
     )
 
 
@@ -260,16 +233,11 @@ def print_report(speed: Speed) -> None:
     """The figures, and where the time goes."""
     out = console.out()
     out.print(console.verdict_table("speed in still air", speed.rows))
-    parts = {"bare JSBSim": speed.bare_us, "closed loop": speed.closed_us} | {
-        f"  {stage}": us for stage, us in speed.stages_us.items()
-    }
+    parts = {"bare JSBSim": speed.bare_us, "closed loop": speed.closed_us}
+    parts |= {f"  {stage}": us for stage, us in speed.stages_us.items()}
     out.print(console.figure_table("where the time goes", parts, "us per tick"))
-    out.print(
-        Text(
-            f"{speed.repeats} pairs of {speed.n_ticks} ticks; median ratio of the pairs {speed.median_ratio:.2f} "
-            f"(least over least {speed.ratio:.2f})"
-        )
-    )
+    pairs = f"{speed.repeats} pairs of {speed.n_ticks} ticks; median ratio of the pairs {speed.median_ratio:.2f}"
+    out.print(Text(f"{pairs} (least over least {speed.ratio:.2f})"))
 
 
 def run(estimator: str, seconds: float, repeats: int, json_: str | None) -> int:
