@@ -14,19 +14,18 @@ bank angle times the cosine of the pitch angle.
 Names
 -----
 A name reads quantity, frame, unit: ``omega_b_rad_s``, ``v_e_m_s``, ``p_e_m``, ``t_s``.  Rotations and
-fractions carry no unit.  Inside: SI and radians.  Degrees live in configuration and in what a person reads,
-always with the suffix; feet and pounds live in ``sim/aeroplane/jsbsim_model.py`` and
-``sim/aeroplane/jsbsim_plant.py`` and end there.
+fractions carry no unit.  Code uses SI and radians.  Degrees appear in configuration and output, always with the
+suffix; feet and pounds only in ``sim/aeroplane/jsbsim_model.py`` and ``sim/aeroplane/jsbsim_plant.py``.
 
 Signs
 -----
 * Specific force ``force_b_m_s2`` is acceleration minus gravity: level at rest it is ``(0, 0, -9.8)``.  The
   paper's accelerometer is its negative; each estimator that follows the paper converts once and says where.
 * The gyro measures the rate against inertial space, ``omega_b_rad_s``.
-* ``gyro_bias_b_rad_s`` is what the gyro reads too much: true rate = reading - bias.  The paper's integral
+* ``gyro_bias_b_rad_s`` is reading minus true rate.  The paper's integral
   correction is its negative.
-* ``wind_e_m_s`` is the velocity of the air over the ground: where it blows to.  People type the direction it
-  blows from.
+* ``wind_e_m_s`` is the velocity of the air over the ground: where it blows to.  On the command line wind is the
+  direction it blows from.
 * Commands ``aileron``, ``elevator``, ``rudder`` in -1..1 have the sign of the rotation they cause: roll right,
   nose up, nose right.  ``throttle`` is 0..1.
 * Attitude error is the angle of ``R_est @ R_true.T``, split into inclination (the angle between the two
@@ -61,23 +60,23 @@ ESTIMATORS: dict[str, str] = {
     "peer_imufusion": "estimator.peers.peers:Imufusion",
     "peer_imufusion_9d": "estimator.peers.peers:Imufusion9D",
 }
-"""Every estimator that can be named: name -> ``module:Class``, imported only when it flies."""
+"""Every registered estimator: name -> ``module:Class``, imported only when it flies."""
 
 _Class = TypeVar("_Class", bound=type)
 
 
 def register(name: str) -> Callable[[_Class], _Class]:
-    """Class decorator: make one's own estimator known under `name`.
+    """Class decorator: register your own estimator under `name`.
 
     Raises
     ------
-    ValueError    the name is taken by another class
+    ValueError    another class has this name
     """
 
     def enter(cls: _Class) -> _Class:
         where = f"{cls.__module__}:{cls.__qualname__}"
         if ESTIMATORS.setdefault(name, where) != where:
-            raise ValueError(f"estimator {name!r} is already {ESTIMATORS[name]}; choose another name than {name!r}")
+            raise ValueError(f"estimator {name!r} is already {ESTIMATORS[name]}; choose another name")
         return cls
 
     return enter

@@ -1,8 +1,8 @@
-"""Two estimators to measure the others against: gyros alone, and the accelerometer taken at its word.
+"""Two baselines for comparison: gyros alone, and tilt from the accelerometer alone.
 
-`GyroOnly` shows what drift correction is worth: it is Eqns 16-21 of the paper without feedback.
-`AccelerometerOnly` takes whatever the accelerometer feels for the pull of gravity.  One of the paper's authors
-tried that in a hand launch: the push was felt as a climb, and the controls dived.
+`GyroOnly` shows what drift correction is worth: it is Eqns 16-21 of the paper without feedback.  `AccelerometerOnly`
+takes every specific force for gravity.  One of the paper's authors tried that in a hand launch: the push looked like a
+climb, and the controls dived.
 
 References
 ----------
@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
+from estimator.blocks.kernels import cross, dot, plus, put
 from estimator.blocks.screening import FORCE_GOOD, health_of, screen, screen_gyro, take_rate
 from estimator.compiler.jit import kernel
 from estimator.interface import Column, ImuSample, Instrument
@@ -26,27 +27,23 @@ STATE_DTYPE = state_dtype(Params, Column("tilt_from_force", (), "1 if the accele
 @kernel
 def lean_on_force(R_eb, f):  # type: ignore[no-untyped-def]
     """Turn `R_eb`, in place, until its down axis is opposite to the specific force; the nose keeps its heading."""
-    length = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
-    if length < 1e-3:  # falling freely: no direction
+    length = np.sqrt(dot(f, f))
+    if length < 1e-3:  # free fall: no direction
         return
-    x, y, z = -f[0] / length, -f[1] / length, -f[2] / length
-    # The north row less its part along down, then east = down x north; a north row along down is no heading.
-    along = R_eb[0, 0] * x + R_eb[0, 1] * y + R_eb[0, 2] * z
+    down = (-f[0] / length, -f[1] / length, -f[2] / length)
+    # The north row without its part along down, then east = down x north; north along down gives no heading.
+    along = dot(R_eb[0], down)
     if abs(along) > 0.999:
         return
-    R_eb[0, 0] -= along * x
-    R_eb[0, 1] -= along * y
-    R_eb[0, 2] -= along * z
-    R_eb[1, 0] = y * R_eb[0, 2] - z * R_eb[0, 1]
-    R_eb[1, 1] = z * R_eb[0, 0] - x * R_eb[0, 2]
-    R_eb[1, 2] = x * R_eb[0, 1] - y * R_eb[0, 0]
+    put(R_eb[0], 1.0, plus(R_eb[0], -along, down))
+    put(R_eb[1], 1.0, cross(down, R_eb[0]))
     if not renormalise(R_eb):
         level(R_eb)
 
 
 @kernel
 def step(rows, k, state):  # type: ignore[no-untyped-def]
-    """One sample: integrate the gyros, and lean on the accelerometer where asked; returns the `Health`."""
+    """One sample: integrate the gyros, set the tilt from the accelerometer if wanted; returns the `Health`."""
     row, s = rows[k], state[0]
     good = screen(row, s) if s.tilt_from_force else screen_gyro(row, s)
     if good:
@@ -64,7 +61,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class GyroOnly(Compiled[None]):
-    """Eqns 16-21 without drift correction: gyros from power-up on, less the offset measured there."""
+    """Gyros alone, less the offset measured at power-up (Eqns 16-21): a baseline."""
 
     heading_reference = "nose"
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro",)
@@ -76,7 +73,7 @@ class GyroOnly(Compiled[None]):
 
 
 class AccelerometerOnly(GyroOnly):
-    """Tilt from the accelerometer alone at every sample, heading from the gyros."""
+    """Tilt from the accelerometer alone, heading from the gyros: a baseline."""
 
     uses = ("gyro", "accelerometer")
     _tilt_from_force = True

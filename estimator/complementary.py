@@ -88,7 +88,7 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def tilt_error(f, s):  # type: ignore[no-untyped-def]
-    """The small rotation, in body axes, that brings the estimated down axis to the gravity felt; a tuple of three."""
+    """The small rotation, in body axes, from the estimated down axis to the measured gravity; a tuple."""
     w, v = s.omega_b_rad_s, s.v_e_m_s
     speed = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     x, y, z = -f[0], w[2] * speed - f[1], -w[1] * speed - f[2]  # omega x (speed, 0, 0) - f
@@ -118,7 +118,7 @@ def heading_error(s):  # type: ignore[no-untyped-def]
 def step(rows, k, state):  # type: ignore[no-untyped-def]
     """One sample: the whole algorithm; returns the `Health`."""
     row, s = rows[k], state[0]
-    good = screen(row, s)  # which of this sample can be believed
+    good = screen(row, s)  # which parts of this sample are plausible
     if not good:
         return POOR  # no time has passed
     take_rate(row, s, good)  # omega_b_rad_s = gyro - bias
@@ -144,7 +144,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Complementary(Compiled[ComplementaryParams]):
-    """The filter as the loop calls it; `Compiled` has ``reset``, ``update``, ``replay`` and the counters."""
+    """Complementary filter on the rotation matrix: the example to copy for your own."""
 
     heading_reference = "course"
     uses = ("gyro", "accelerometer", "gps")

@@ -1,46 +1,47 @@
 """The multi-rotor estimator of Dilshad and Jahan (2014): the DCM of Premerlani and Bizard with a magnetometer for yaw.
 
-Gyros steer (Premerlani's Eqns 16-21); the accelerometer as it is, without a centrifugal term, corrects roll and pitch;
-every 125 ms the tilt-compensated magnetometer (Eqns 5-7) says how far the yaw of the gyros has drifted; and over a long
-time the course from three GPS positions (Eqn 9) corrects what the magnetometer says, declination and leftover iron.
-All errors go through one PI controller (Premerlani's Eqns 28-29).  Iron: `estimator.blocks.magnetometer` (Eqn 8).
+The gyros are integrated (Premerlani's Eqns 16-21); the accelerometer, without a centrifugal term, corrects roll and
+pitch; every 125 ms the tilt-compensated magnetometer (Eqns 5-7) gives the yaw drift of the gyros; and over a long time
+the course from three GPS positions (Eqn 9) corrects the magnetometer's declination and leftover iron.  All errors pass
+one PI controller (Premerlani's Eqns 28-29).  Iron: `estimator.blocks.calibration` (Eqn 8).
 
-The tilt of Eqns 5 and 6 is the accelerometer's.  That is right for a craft that stands or hovers in the mean.  In a
-coordinated turn the accelerometer feels no bank at all: the vertical part of the field then passes for a horizontal
-one, and in the north of America, where it is two and a half times the horizontal, the heading is off by more than the
-bank.  It is what pilots of compasses know as the northerly turning error: banked to the right on a northerly heading,
-the compass shows a turn to the left, and an autopilot that steers by it banks further.  In straight flight in a
-crosswind (the scenario, calibrated sensors, seeds 0-2) the heading error is 82 degrees with this tilt and 9 with the
-matrix's.  And the course is a heading only for what flies along its nose, an aeroplane in still air.  Neither is
-mended here: it is the paper's estimator, and one for multi-rotors.
+The tilt of Eqns 5 and 6 is the accelerometer's.  That is right for a craft at rest or, on average, in hover.  In a
+coordinated turn the accelerometer shows no bank: the vertical part of the field then counts as horizontal, and in
+the north of America, where it is two and a half times the horizontal part, the heading is off by more than the bank.
+This is the northerly turning error of magnetic compasses: banked to the right on a northerly heading, the compass shows
+a turn to the left, and an autopilot that steers by it banks further.  In straight flight in a crosswind (the scenario,
+calibrated sensors, seeds 0-2) the heading error is 82 degrees with this tilt and 9 with that of the matrix.  And the
+course equals the heading only for an aeroplane in still air.  Neither is corrected here: this is the paper's estimator,
+made for multi-rotors.
 
 Axes
 ----
 The paper turns both frames by 180 degrees about forward: body forward-left-up, earth north-west-up, so that its matrix
-is D R_eb D with D = diag(1, -1, -1).  The update of the matrix is the same in either.  The paper's axes are entered in
-`heading_of_field` and in `paper_angles`, and left there.
+is D R_eb D with D = diag(1, -1, -1).  The update of the matrix is the same in either.  Only `heading_of_field` and
+`paper_angles` use the paper's axes.
 
 Errata
 ------
 *Eqn 4.*  With R = R_x(phi) R_z(-psi) R_y(-theta), of Eqns 1 to 3, three elements have wrong signs in print: the second
 terms of R_yx and R_zz, and the first of R_zx.  At zero angles the printed matrix is singular.  (The names R_y(theta_y)
-in Eqn 2 and R_z(theta_z) in Eqn 3 are interchanged.)  Eqns 10 to 12 follow from the right one; their ``tan^-2`` is the
-arctangent of two arguments.  Yaw is the middle angle: roll and pitch are lost at east and west, and no yaw is beyond.
+in Eqn 2 and R_z(theta_z) in Eqn 3 are interchanged.)  Eqns 10 to 12 follow from the correct matrix; their ``tan^-2`` is
+the arctangent of two arguments.  Yaw is the middle angle: roll and pitch are undefined at east and west, and yaw cannot
+go beyond.
 
 *Eqns 5 and 6* turn by the angle about the y axis, right-handed; the paper's pitch (nose up, Eqn 11) is its negative.
-And roll and pitch must be angles in that order, roll first: with those of the usual order (``roll = arctan(y / z)``)
-the heading of a body that is both rolled and pitched is wrong.  With roll first, Eqn 7 is the heading square to the
-wings, off the nose's by about roll times pitch: it is compared with that of the estimate, not with its nose.
+And the angles must be roll first, then pitch: with those of the usual order (``roll = arctan(y / z)``) the heading of
+a body that is both rolled and pitched is wrong.  With roll first, Eqn 7 is the heading square to the wings, which
+differs from the nose's by about roll times pitch: it is compared with the estimate's heading square to the wings.
 
-*Eqns 7 and 9.*  ``arctan(Y / X)`` takes south for north; read the arctangent of two arguments.
+*Eqns 7 and 9.*  ``arctan(Y / X)`` confuses south with north; read the arctangent of two arguments.
 
-*"The gyro readings have been normalized before calculating the kinematics"* (section f).  A normalised rate is 1 rad/s
-whatever the gyro says.  It is the matrix that is normalised.
+*"The gyro readings have been normalized before calculating the kinematics"* (section f).  A normalised rate is always
+1 rad/s; the matrix is normalised instead.
 
 Beyond the paper
 ----------------
-The paper gives no gains.  "Reporting latency and filtering have been taken into account", it says of the GPS: here by
-adding to the course what the nose has turned since, through one lag.  In turns no course is used: Eqn 7 is wrong there.
+The paper gives no gains.  "Reporting latency and filtering have been taken into account", it says of the GPS: here the
+turn of the nose since then, through one lag, is added to the course.  In turns no course is used: Eqn 7 is wrong there.
 
 References
 ----------
@@ -54,7 +55,7 @@ import math
 import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
-from estimator.blocks.kernels import wrap
+from estimator.blocks.kernels import cross, dot, put, wrap
 from estimator.blocks.magnetometer import FIELD, take_field, turn_to_north
 from estimator.blocks.pi import corrected_rate, feed_back, weigh
 from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen
@@ -63,24 +64,24 @@ from estimator.interface import Array, Column, HeadingReference, ImuSample
 from estimator.params.dilshad import DilshadParams as DilshadParams
 from estimator.rotation import integrate
 
-HEADING_LIFE_S = 1.0  # a magnetometer silent for longer corrects nothing any more
+HEADING_LIFE_S = 1.0  # an older magnetometer heading is not used
 STRAIGHT_RAD = math.radians(10.0)  # a nose that has turned further than this since the course was true is in a turn
-LONGEST_STEP_S, FASTEST_M_S = 2.5, 300.0  # between two positions that tell a velocity
+LONGEST_STEP_S, FASTEST_M_S = 2.5, 300.0  # between two positions that give a velocity
 
 
 _STATE = (
     Column("omega_p_b", (3,), "proportional rate correction"),
-    Column("omega_i_b", (3,), "integral rate correction; minus the offset still found"),
+    Column("omega_i_b", (3,), "integral rate correction; minus the offset learnt since"),
     Column("omega_total_b", (3,), "corrected rate that is integrated"),
     Column("roll_pitch_b", (3,), "roll-pitch correction"),
     Column("yaw_b", (3,), "yaw correction"),
     Column("total_b", (3,), "weighted sum"),
     Column("heading_rad", (), "last heading of the magnetometer, Eqn 7, uncorrected"),
     Column("heading_age_s", (), "time since it"),
-    Column("heading_due_s", (), "time saved up for the next one"),
-    Column("correction_rad", (), "what the GPS has found the magnetometer's heading to lack"),
-    Column("drift", (), "yaw still wanted, about down: sine of the angle, of size 1 beyond a right angle"),
-    Column("turned_rad", (), "what the nose has turned since the course was true"),
+    Column("heading_due_s", (), "time accumulated for the next one"),
+    Column("correction_rad", (), "correction of the magnetometer's heading, learnt from the GPS"),
+    Column("drift", (), "yaw still needed, about down: sine of the angle, of size 1 beyond a right angle"),
+    Column("turned_rad", (), "turn of the nose since the course was true"),
     Column("p_e_m", (2, 2), "the last two positions, north and east, the newer one first"),
     Column("p_age_s", (2,), "and how old they are"),
     Column("courses", (), "courses taken so far", integer=True),
@@ -95,7 +96,7 @@ def heading_of_field(m, f):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    m : shape (3,)   field, body axes      f : shape (3,)   specific force of something that is not accelerated
+    m : shape (3,)   field, body axes      f : shape (3,)   specific force of a body that is not accelerated
     """
     # The paper's axes: forward, left, up.
     mx, my, mz = m[0], -m[1], -m[2]
@@ -112,9 +113,9 @@ def heading_of_field(m, f):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_heading(row, s, good):  # type: ignore[no-untyped-def]
-    """Every 125 ms, see how far the yaw has drifted from the magnetometer's heading; the first field sets it.
+    """Every 125 ms, compare the yaw with the magnetometer's heading; the first field sets it.
 
-    What sets it is compensated with the tilt of the matrix: a single sample of the accelerometer vibrates.
+    The first one is compensated with the tilt of the matrix: a single sample of the accelerometer vibrates.
     """
     s.heading_age_s += s.dt_s
     s.heading_due_s = min(s.heading_due_s + s.dt_s, 2.0 * s.yaw_every_s)
@@ -126,7 +127,7 @@ def take_heading(row, s, good):  # type: ignore[no-untyped-def]
     if not (came and good & FORCE_GOOD and s.heading_due_s >= s.yaw_every_s):
         return
     heading = heading_of_field(s.field_b_ut, row.force_b_m_s2) + s.declination_rad
-    if not np.isfinite(heading):  # falling freely, or no field
+    if not np.isfinite(heading):  # free fall, or no field
         return
     s.heading_due_s -= s.yaw_every_s
     s.heading_age_s, s.heading_rad = 0.0, heading
@@ -160,11 +161,11 @@ def take_course(row, s):  # type: ignore[no-untyped-def]
     s.p_e_m[1, 0], s.p_e_m[1, 1], s.p_age_s[1] = s.p_e_m[0, 0], s.p_e_m[0, 1], s.p_age_s[0]
     s.p_e_m[0, 0], s.p_e_m[0, 1], s.p_age_s[0] = x, y, 0.0
     straight = abs(s.turned_rad) <= STRAIGHT_RAD and s.heading_age_s <= HEADING_LIFE_S
-    # Positions 0.2 s apart that are 0.3 m wrong make 1 m/s out of nothing; the receiver's own speed does not.
+    # Positions 0.2 s apart that are 0.3 m wrong give a false 1 m/s; the receiver's own speed does not.
     moving = s.min_speed_m_s <= row.gps_speed_m_s <= FASTEST_M_S and np.hypot(vx, vy) <= FASTEST_M_S
     if not (near and straight and moving):
         return
-    course = np.arctan2(vy, vx) + s.turned_rad  # Eqn 9, and what has been turned since
+    course = np.arctan2(vy, vx) + s.turned_rad  # Eqn 9, and the turn since
     s.courses += 1
     part = max(1.0 / s.courses, min(second_s / s.gps_weight_s, 1.0))  # a mean at first, then one that forgets
     if s.gps_weight_s < np.inf:
@@ -173,14 +174,10 @@ def take_course(row, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
-    """Fill ``s.roll_pitch_b``: down as the accelerometer has it x down as estimated (Premerlani's Eqn 27, mended)."""
+    """Fill ``s.roll_pitch_b``: measured down x estimated down (Premerlani's Eqn 27, corrected)."""
     f = row.force_b_m_s2
-    length = np.sqrt(f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
-    scale = -1.0 / length if length > 0.0 else 0.0
-    x, y, z = s.R_eb[2, 0], s.R_eb[2, 1], s.R_eb[2, 2]
-    s.roll_pitch_b[0] = scale * (f[1] * z - f[2] * y)
-    s.roll_pitch_b[1] = scale * (f[2] * x - f[0] * z)
-    s.roll_pitch_b[2] = scale * (f[0] * y - f[1] * x)
+    length = np.sqrt(dot(f, f))
+    put(s.roll_pitch_b, -1.0 / length if length > 0.0 else 0.0, cross(f, s.R_eb[2]))
 
 
 @kernel
@@ -213,7 +210,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
     """Roll, pitch and yaw [rad] as the paper reads them off its matrix (Eqns 10 to 12), each of shape (...).
 
-    For people who compare with the paper: yaw is within 90 degrees of north, where roll and pitch mean nothing.
+    For comparison with the paper.  Yaw is within 90 degrees of north; at 90 degrees roll and pitch are undefined.
     """
     # The paper's matrix is D R_eb D with D = diag(1, -1, -1): elements between x and the others change their sign.
     r_xx, r_xy, r_xz = R_eb[..., 0, 0], -R_eb[..., 0, 1], -R_eb[..., 0, 2]
@@ -222,7 +219,7 @@ def paper_angles(R_eb: Array) -> tuple[Array, Array, Array]:
 
 
 class Dilshad(Compiled[DilshadParams]):
-    """Dilshad and Jahan (2014): yaw by the magnetometer, no centrifugal term; see the module.
+    """Dilshad and Jahan (2014): yaw from the magnetometer, no centrifugal term; for multi-rotors.
 
     The first field sets the heading.
     """

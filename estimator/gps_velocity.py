@@ -1,28 +1,26 @@
-"""Roll-pitch drift from the change of GPS velocity: Premerlani's note of 2011, with a yaw reference of one's choice.
+"""Roll-pitch drift from the change of GPS velocity: Premerlani's note of 2011, with a choice of yaw reference.
 
-An accelerometer feels gravity minus acceleration (Eqn 1), and the attitude carries that into the earth frame
-(Eqn 2).  Integrated between two GPS reports it must be what gravity and the change of the reported velocity leave
-(Eqn 3); the cross product of the two sides is the error of the attitude (Eqns 4 and 5).  No airspeed, no angle of
-attack and no sideslip is assumed, so the method holds in turns, in wind and in loops, where the centrifugal
-term of the first paper does not.
+An accelerometer measures gravity minus acceleration (Eqn 1), and the attitude rotates that into the earth frame
+(Eqn 2).  Integrated between two GPS reports it must equal gravity less the change of the reported velocity (Eqn 3); the
+cross product of the two sides is the error of the attitude (Eqns 4 and 5).  No airspeed, angle of attack or sideslip is
+assumed, so the method holds in turns, in wind and in loops, where the centrifugal term of the first paper does not.
 
 Lag --- A receiver reports velocity filtered and late.  The left side of Eqn 3, and the nose, pass the same filter and
-are recalled from one latency ago, with all corrections that were made since (`estimator.blocks.gyro_frame`).  An error
-found at a report is removed evenly until the next one, by 1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
+are recalled from one latency ago, with all corrections made since (`estimator.blocks.gyro_frame`).  An error found at
+a report is removed evenly until the next one, by 1 - exp(-K_P W interval): the same loop at 1 and at 10 Hz.
 
-Yaw --- ``course`` and ``nose``: the matrix itself is turned to the nose, which is where the velocity through the air
-points (Eqns 22 to 24 of the paper of 2009, with v_gps - wind for the course).  The wind is learnt in turns
-(`estimator.blocks.wind`); as long as none has been flown that is the course over ground.  ``course`` then tells the
-heading of the paper: the matrix is handed out turned by the crab angle.  So Eqn 4 compares along the true heading
-whatever is told; along the course a crab of 23 degrees becomes a tilt in every turn.  ``magnetometer``: to magnetic
-north.
+Yaw --- ``course`` and ``nose``: the matrix itself is turned to the nose, the direction of the velocity through the air
+(Eqns 22 to 24 of the paper of 2009, with v_gps - wind for the course).  The wind is learnt in turns
+(`estimator.blocks.wind`); before the first turn that is the course over ground.  With ``course`` the reported heading
+is that of the paper: the reported matrix is turned by the crab angle.  Eqn 4 so compares along the true heading in
+either case; along the course, a crab of 23 degrees becomes a tilt in every turn.  ``magnetometer``: to magnetic north.
 
-Before the yaw is locked
-------------------------
-With an unknown heading an acceleration along the ground is taken for a tilt: in a launch by 11 degrees.  Until the
-nose has come near the reference, and where no reports come, the paper of 2009 stands in (Eqns 25 to 27): the
-acceleration is the speed times the turning of the nose.  Summed up, that is Eqn 3 with the velocity along the nose.
-And nothing is corrected while the length of what is then taken for gravity is not gravity's.
+Before the yaw lock
+-------------------
+With an unknown heading, an acceleration along the ground counts as tilt: 11 degrees in a launch.  Until the nose is
+near the reference, and without reports, the paper of 2009 is used instead (Eqns 25 to 27): the acceleration is the
+speed times the turn rate of the nose.  Integrated, that is Eqn 3 with the velocity along the nose.  There is no
+correction while the length of the resulting gravity is wrong.
 
 References
 ----------
@@ -44,6 +42,7 @@ from estimator.blocks.gyro_frame import (
     sum_up,
     to_earth,
 )
+from estimator.blocks.kernels import cross, dot, put
 from estimator.blocks.magnetometer import FIELD, take_field
 from estimator.blocks.pi import feed_back
 from estimator.blocks.screening import GPS, health_of, refuse, screen, take_rate
@@ -55,25 +54,25 @@ from estimator.params.gps_velocity import NOSE as GPS_VELOCITY_NOSE
 from estimator.params.gps_velocity import YAW_REFERENCES
 from estimator.params.gps_velocity import GpsVelocityParams as GpsVelocityParams
 
-FIX_LIFE_S = 2.5  # reports further apart are compared no more
-LOCK_LIFE_S = 30.0  # without reports for so long, the heading is as good as unknown
-STAND_IN_S = 0.1  # how often the paper's correction is worked out where it stands in
+FIX_LIFE_S = 2.5  # reports further apart are not compared
+LOCK_LIFE_S = 30.0  # after so long without reports, the heading counts as unknown
+STAND_IN_S = 0.1  # interval of the 2009 correction, where it is used
 LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is locked once it was this close for this long
-LEAST_DOWN = 0.3  # of gravity, in the vertical as felt
+LEAST_DOWN = 0.3  # of gravity, in the measured vertical
 COURSE, NOSE, MAGNETOMETER = 0, 1, 2
 _STATE = (
     Column("yaw_reference", (), "COURSE, NOSE or MAGNETOMETER", integer=True),
-    Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
+    Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset learnt since"),
     Column("since_fix_g_m_s", (3,), "left side of Eqn 3 over the last interval"),
     Column("fix_t_s", (), "when the last fix was true, by the clock of the state"),
     Column("interval_s", (), "from the fix before it"),
     Column("v_e_m_s", (3,), "velocity of the last fix"),
     Column("fix_age_s", (), "time since a fix arrived"),
-    Column("mag_t_s", (), "when the magnetometer spoke last"),
-    Column("stand_in_t_s", (), "start of the interval of the stand-in"),
-    Column("stand_in_g", (6,), "felt integral and nose then"),
-    Column("error_e", (3,), "the error being worked on, earth axes, Eqn 4"),
-    Column("error_g", (3,), "the same, or another vector, axes of the gyros' earth"),
+    Column("mag_t_s", (), "time of the last magnetometer sample"),
+    Column("stand_in_t_s", (), "start of the interval of the 2009 correction"),
+    Column("stand_in_g", (6,), "`felt_g_m_s` and nose at that time"),
+    Column("error_e", (3,), "present error, earth axes, Eqn 4"),
+    Column("error_g", (3,), "the same, or another vector, in the gyros' frame"),
     Column("total_b", (3,), "weighted error, Eqn 28"),
     Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
     Column("near_s", (), "how long the yaw error has been small"),
@@ -84,7 +83,7 @@ STATE_DTYPE = state_dtype(GpsVelocityParams, *FIELD, *WIND_FILTER, *GYRO_FRAME, 
 
 @kernel
 def correct(s, error_e, weight, k_i, interval_s, rate_e):  # type: ignore[no-untyped-def]
-    """Give an error to the PI controller (Eqns 5, 28 and 29) and set `rate_e`, which removes it within the interval."""
+    """Pass an error through the PI controller (Eqns 5, 28, 29); set `rate_e`, which removes it within the interval."""
     for i in range(3):
         s.error_g[i] = s.R_eg[0, i] * error_e[0] + s.R_eg[1, i] * error_e[1] + s.R_eg[2, i] * error_e[2]
     for i in range(3):
@@ -111,7 +110,7 @@ def correct_tilt(s, error_e, weight, interval_s):  # type: ignore[no-untyped-def
 def correct_yaw(s, sine, cosine, length, interval_s):  # type: ignore[no-untyped-def]
     """Yaw error: `sine` and `cosine` of the angle still to turn, both times `length`, which weighs it.
 
-    The cross product of Eqn 23 fades beyond a right angle: there its sign is kept, at full strength.
+    The cross product of Eqn 23 decreases beyond a right angle: there only its sign is used, with full size.
     """
     near = cosine > 0.0 and abs(sine) < np.tan(LOCK_RAD) * cosine
     s.near_s = s.near_s + interval_s if near else 0.0
@@ -120,7 +119,7 @@ def correct_yaw(s, sine, cosine, length, interval_s):  # type: ignore[no-untyped
     ground = sine if cosine >= 0.0 else np.copysign(length, sine)  # Eqn 23
     s.error_e[0] = s.error_e[1] = 0.0
     s.error_e[2] = ground  # Eqn 24: along the vertical
-    k_i = s.k_i if s.locked else 0.0  # finding the yaw is no gyro offset
+    k_i = s.k_i if s.locked else 0.0  # an unknown initial yaw is no gyro offset
     correct(s, s.error_e, s.w_y, k_i, interval_s, s.yaw_rate_e)
     s.yaw_left_s = interval_s
 
@@ -128,26 +127,23 @@ def correct_yaw(s, sine, cosine, length, interval_s):  # type: ignore[no-untyped
 @kernel
 def roll_pitch_at_fix(s, dv_e_m_s):  # type: ignore[no-untyped-def]
     """Eqns 3 and 4 over the interval between two fixes, `dv_e_m_s` the change of the reported velocity."""
-    left0, left1, left2 = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
-    right0, right1, right2 = -dv_e_m_s[0], -dv_e_m_s[1], s.interval_s * G_M_S2 - dv_e_m_s[2]
+    left = to_earth(s, s.since_fix_g_m_s)  # left side of Eqn 3
+    down = s.interval_s * G_M_S2 - dv_e_m_s[2]
     if not s.gps_vertical_velocity:
-        # As felt, so that the cross product compares the horizontal components; but downward, or an estimate that is
-        # upside down would stay so.
-        right2 = max(left2, LEAST_DOWN * s.interval_s * G_M_S2)
-    # Eqn 4, divided by both lengths; by no less than half of gravity's, so that a fall without weight says little.
+        # As measured, so that the cross product compares the horizontal components; but downward, or an inverted
+        # estimate would stay inverted.
+        down = max(left[2], LEAST_DOWN * s.interval_s * G_M_S2)
+    right = (-dv_e_m_s[0], -dv_e_m_s[1], down)
+    # Eqn 4, divided by both lengths, but by no less than half of gravity's, so that free fall has little weight.
     least = 0.5 * s.interval_s * G_M_S2
-    left_length = max(np.sqrt(left0 * left0 + left1 * left1 + left2 * left2), least)
-    right_length = max(np.sqrt(right0 * right0 + right1 * right1 + right2 * right2), least)
-    scale = 1.0 / (left_length * right_length)
-    s.error_e[0] = scale * (left1 * right2 - left2 * right1)
-    s.error_e[1] = scale * (left2 * right0 - left0 * right2)
-    s.error_e[2] = scale * (left0 * right1 - left1 * right0)
+    scale = 1.0 / (max(np.sqrt(dot(left, left)), least) * max(np.sqrt(dot(right, right)), least))
+    put(s.error_e, scale, cross(left, right))
     correct_tilt(s, s.error_e, s.w_rp, s.interval_s)
 
 
 @kernel
 def stand_in(s):  # type: ignore[no-untyped-def]
-    """The paper's roll-pitch correction (Eqns 25 to 27) over the time since it was last worked out.
+    """The roll-pitch correction of 2009 (Eqns 25 to 27), over the time since it was last computed.
 
     Integrated, omega x V is the speed times the change of the nose.
     """
@@ -200,7 +196,7 @@ def yaw_at_fix(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_fix(row, s):  # type: ignore[no-untyped-def]
-    """All that happens at a GPS report."""
+    """Process a GPS report."""
     v = row.gps_v_e_m_s
     vertical = abs(v[2]) < 1000.0 or not s.gps_vertical_velocity
     if not (abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and vertical):
@@ -226,7 +222,7 @@ def take_fix(row, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def turn_to_north(s, sine, cosine):  # type: ignore[no-untyped-def]
-    """Turn the heading at once by the angle of that sine and cosine: the first field is where it begins."""
+    """Turn the heading at once by the angle of that sine and cosine: the first field sets it."""
     for j in range(3):
         x, y = s.R_eg[0, j], s.R_eg[1, j]
         s.R_eg[0, j], s.R_eg[1, j] = cosine * x - sine * y, sine * x + cosine * y
@@ -236,7 +232,7 @@ def turn_to_north(s, sine, cosine):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_mag(row, s):  # type: ignore[no-untyped-def]
-    """Turn the nose by what the horizontal field is off magnetic north."""
+    """Correct the yaw by the angle between the horizontal field and magnetic north."""
     if not take_field(row, s):
         return
     m = s.field_b_ut
@@ -286,7 +282,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class GpsVelocity(Compiled[GpsVelocityParams]):
-    """Premerlani's note of 2011: roll and pitch from the change of GPS velocity; see the module."""
+    """Premerlani (2011): roll and pitch from the change of GPS velocity, yaw from the course."""
 
     heading_reference: HeadingReference = "course"  # "nose" with another `yaw_reference`
     _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE
@@ -305,13 +301,13 @@ class GpsVelocity(Compiled[GpsVelocityParams]):
 
 
 class GpsVelocityNose(GpsVelocity):
-    """`GpsVelocity` whose heading is the nose's: the wind is learnt in turns and subtracted from the GPS velocity."""
+    """gps_velocity with the nose as heading: wind learnt in turns is subtracted from the GPS velocity."""
 
     _default = GPS_VELOCITY_NOSE
 
 
 class GpsVelocityMagnetometer(GpsVelocity):
-    """`GpsVelocity` whose heading is the nose's, from the magnetometer."""
+    """gps_velocity with the heading from the magnetometer."""
 
     uses = ("gyro", "accelerometer", "gps", "magnetometer")
     _default = GPS_VELOCITY_MAGNETOMETER

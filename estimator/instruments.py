@@ -1,10 +1,10 @@
-"""What is known of the instruments aboard, and how it is known.
+"""Known properties of the instruments aboard, each with its source.
 
-One record, `Instruments`, is built for each flight or log: from the data sheets of the sensor suite, from what a log
-says of itself, and from what the user sets.  Every estimator and autopilot receives those properties for which it has
-a parameter of the same name; one whose constructor takes an argument ``instruments`` receives the whole record.
+One record, `Instruments`, is built for each flight or log: from the data sheets of the sensor suite, from the log
+itself, and from the user's settings.  An estimator or autopilot receives the properties for which it has a parameter of
+the same name; one whose constructor takes an argument ``instruments`` receives the whole record.
 
->>> instruments.value("gps_latency_s")       # 0.3, or None where nobody knows
+>>> instruments.value("gps_latency_s")       # 0.3, or None if unknown
 >>> instruments["gps_latency_s"].source      # "data sheet"
 
 A property is a data-sheet value or a setting.  It never depends on the errors drawn for one flight.
@@ -19,13 +19,13 @@ Source = Literal["set", "data sheet", "log", "learnt", "assumed", "withheld", "u
 
 
 class Property(NamedTuple):
-    """One property: its meaning, and what is assumed where nothing is known; None where nothing can be."""
+    """One property: its meaning, and the value assumed if unknown; None if there is no sensible assumption."""
 
     meaning: str
     assumed: float | bool | None = None
 
 
-# Assumed is a present-day receiver, and a present-day inertial unit of 2000 deg/s and 16 g.
+# Assumed: a present-day receiver, and a present-day inertial unit of 2000 deg/s and 16 g.
 PROPERTIES: Mapping[str, Property] = {
     "gps_filter_s": Property("time constant of the receiver's velocity filter; 0 is none", 0.0),
     "gps_latency_s": Property("from the moment a fix is true to its arrival", 0.3),
@@ -48,10 +48,9 @@ PROPERTIES: Mapping[str, Property] = {
     "magnetometer_calibrated": Property("whether its readings are free of iron and motor, by nature or by calibration"),
     "use_airspeed": Property("whether an airspeed sensor is fitted and used"),
 }
-"""Every property: name, as parameters of estimators and autopilots spell it -> what it means."""
+"""Every property: name, spelled as the parameters of estimators and autopilots -> its meaning."""
 
-SIGMA_KNOWN_S = 0.02  # standard deviation of a latency that a data sheet or a log gives
-
+SIGMA_KNOWN_S = 0.02  # standard deviation of a latency from a data sheet or a log
 
 BOOLEAN = frozenset(
     {"gps_stamped", "gps_vertical_velocity", "use_magnetometer", "magnetometer_calibrated", "use_airspeed"}
@@ -60,11 +59,11 @@ BOOLEAN = frozenset(
 
 
 def property_value(name: str, value: Any) -> float | bool:
-    """`value` as what the property `name` is, a number or a truth value; it may be spelled as text.
+    """`value` as the type of the property `name`, a number or a switch; it may be given as text.
 
     Raises
     ------
-    ValueError      no such property, or no such value
+    ValueError      unknown property, or a value of the wrong type
     """
     property_names([name])
     if name in BOOLEAN:
@@ -82,7 +81,7 @@ def property_value(name: str, value: Any) -> float | bool:
 
 
 def property_names(names: Iterable[str]) -> tuple[str, ...]:
-    """`names`, each of a property; ``all`` stands for all of them.  ValueError for one that is none."""
+    """`names`, each of a property; ``all`` means every one.  ValueError for an unknown name."""
     wanted = tuple(filter(None, (name.strip() for name in names)))
     if wanted == ("all",):
         return tuple(PROPERTIES)
@@ -95,20 +94,20 @@ def property_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 class Known(NamedTuple):
-    """A property's value, and where it comes from; `origin` names the part, log parameter or map."""
+    """A property's value and its source; `origin` names the part, log parameter or map."""
 
     value: Any
     source: Source
     origin: str = ""
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data; an infinite number, for which JSON has no word, is the text ``inf``."""
+        """As plain data; JSON has no infinity, so an infinite number becomes the text ``inf``."""
         endless = isinstance(self.value, float) and math.isinf(self.value)
         return {"value": str(self.value) if endless else self.value, "source": self.source}
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Known":
-        """What `to_json` wrote."""
+        """The inverse of `to_json`."""
         value = data["value"]
         return cls(math.inf if value == "inf" else value, data["source"])
 
@@ -119,12 +118,12 @@ def to_json(known: Mapping[str, Known]) -> dict[str, dict[str, Any]]:
 
 
 class Instruments(Mapping[str, Known]):
-    """What is known of the instruments aboard; see the module.  Every name of `PROPERTIES` is in it.
+    """Known properties of the instruments; see the module.  Every name of `PROPERTIES` is in it.
 
     Parameters
     ----------
-    known : what is known, by name; a name beside `PROPERTIES` is a parameter of single estimators
-    settings : what the user set, by name: it wins over everything else
+    known : known values by name; other names than those of `PROPERTIES` are parameters of single estimators
+    settings : the user's settings by name; they override everything else
     withheld : names of properties to hide from flight code
     """
 
@@ -148,12 +147,12 @@ class Instruments(Mapping[str, Known]):
         return len(self._record)
 
     def value(self, name: str, default: Any = None) -> Any:
-        """The value of a property, `default` where it has none."""
+        """The value of a property, `default` if it has none."""
         value = self._record[name].value if name in self._record else None
         return default if value is None else value
 
     def changed(self, settings: Mapping[str, Any] | None = None, withheld: Iterable[str] = ()) -> "Instruments":
-        """The same record with more set or withheld."""
+        """A copy with more settings or withheld properties."""
         return Instruments(self._record, settings, withheld)
 
     @property
@@ -171,7 +170,7 @@ def _without_knowledge(name: str, *, withheld: bool = False) -> Known:
 
 
 def _agree(record: dict[str, Known]) -> None:
-    """Make what follows from other entries follow: a latency that is set holds, whatever stamps say."""
+    """Apply what follows from other entries: a latency that the user sets overrides time stamps."""
     latency, stamped, sigma = record["gps_latency_s"], record["gps_stamped"], record["gps_latency_sigma_s"]
     if latency.source == "set" and stamped.source != "set":
         record["gps_stamped"] = Known(False, "set", "gps_latency_s is set")

@@ -1,10 +1,10 @@
-"""What flight code is given and what it returns: the seams of the loop.
+"""What an estimator receives and returns.
 
-`MEASURED` is the one table of measurement columns; the log row of a tick IS the measurement.  A kernel works
-on the rows (`kernel(rows, k, state)`), a person's own estimator on the `Measurements` over the same row:
+`MEASURED` is the table of all measurement columns; the log row of a tick is the measurement.  A kernel works on the
+rows (`kernel(rows, k, state)`), any other estimator on `Measurements`, a view of the same row:
 
->>> m.imu.gyro_b_rad_s, m.imu.dt_s          # always there
->>> m.gps                                   # None, or the fix that arrived in this tick
+>>> m.imu.gyro_b_rad_s, m.imu.dt_s          # in every tick
+>>> m.gps                                   # the fix that arrived in this tick, or None
 """
 
 from enum import IntEnum
@@ -38,7 +38,7 @@ MEASURED = (
     Column("force_b_m_s2", (3,), "mean specific force over the interval; level at rest (0, 0, -9.8)"),
     Column("gps_new", (), "1 where a fix arrived in this tick", integer=True),
     Column("gps_valid", (), "1 while the last fix is usable; the columns below hold the last one", integer=True),
-    Column("gps_t_s", (), "time at which the fix was true, the receiver's own stamp; NaN where it has none"),
+    Column("gps_t_s", (), "time at which the fix was true, as stamped by the receiver; NaN without a stamp"),
     Column("gps_p_e_m", (3,), "reported position, relative to the launch point"),
     Column("gps_v_e_m_s", (3,), "reported velocity over the ground"),
     Column("gps_course_rad", (), "reported course over ground, from north over east, 0..2 pi"),
@@ -46,8 +46,8 @@ MEASURED = (
     Column("mag_new", (), "1 where a magnetometer sample arrived in this tick", integer=True),
     Column("mag_b_ut", (3,), "magnetic field of the last sample, microtesla"),
     Column("air_new", (), "1 where an airspeed or a barometric height arrived in this tick", integer=True),
-    Column("airspeed_m_s", (), "last measured airspeed; with air data but no pitot tube, or none yet, NaN"),
-    Column("baro_height_m", (), "last barometric height above the launch point; likewise NaN"),
+    Column("airspeed_m_s", (), "last measured airspeed; NaN without a pitot tube or before its first report"),
+    Column("baro_height_m", (), "last barometric height above the launch point; NaN likewise"),
 )
 MEASURED_DTYPE = dtype_of(MEASURED)
 
@@ -65,7 +65,7 @@ class ImuSample(NamedTuple):
 
 
 class GpsFix(NamedTuple):
-    """One GPS report as it arrives: filtered and late.  `t_s` is when it was true.
+    """One GPS report as it arrives, filtered and late; `t_s` is the time at which it was true.
 
     p_e_m, v_e_m_s : shape (3,), north-east-down   course_rad : 0..2 pi   speed_m_s : horizontal
     """
@@ -91,9 +91,9 @@ class AirData(NamedTuple):
 
 
 class Measurements(NamedTuple):
-    """All that is known aboard in one tick: a view of row `k` of the measured log (read-only, never overwritten).
+    """All measurements of one tick: a read-only view of row `k` of the measured log.
 
-    A compiled estimator hands `rows` and `k` to its kernel; anyone else reads `imu`, `gps`, `mag`, `air`.
+    A compiled estimator passes `rows` and `k` to its kernel; others read `imu`, `gps`, `mag`, `air`.
     """
 
     rows: NDArray[np.void]
@@ -103,7 +103,7 @@ class Measurements(NamedTuple):
     def of(
         cls, imu: ImuSample, gps: GpsFix | None = None, mag: MagSample | None = None, air: AirData | None = None
     ) -> "Measurements":
-        """Measurements from single samples: for tests, notebooks and logs of one's own."""
+        """Measurements from single samples: for tests, notebooks and your own logs."""
         rows = np.zeros(1, MEASURED_DTYPE)
         row = rows[0]
         row["t_s"], row["dt_s"], row["gyro_b_rad_s"], row["force_b_m_s2"] = imu
@@ -148,7 +148,7 @@ class Measurements(NamedTuple):
 
 
 class Health(IntEnum):
-    """What an estimator says of itself."""
+    """An estimator's own judgement of its attitude."""
 
     STARTING = 0  # before power-up ended, or heading not yet found
     GOOD = 1
@@ -165,11 +165,11 @@ NO_RATE.flags.writeable = False
 class AttitudeEstimate(NamedTuple):
     """What an estimator returns for each tick; only `R_eb` is required.
 
-    A named tuple because it is made in every tick, and a frozen dataclass takes a microsecond more to make.
+    A named tuple, because a frozen dataclass takes a microsecond longer to create in every tick.
 
     R_eb : shape (3, 3)               body-to-earth rotation
     omega_b_rad_s : shape (3,)        drift-corrected rate (used for damping by the autopilot)
-    gyro_bias_b_rad_s : shape (3,)    what the gyro reads too much
+    gyro_bias_b_rad_s : shape (3,)    reading minus true rate
     wind_e_m_s : shape (3,) or None   velocity of the air over the ground, None where not estimated
     health : Health
     """
@@ -187,12 +187,12 @@ Instrument = Literal["gyro", "accelerometer", "gps", "magnetometer", "airspeed"]
 
 @runtime_checkable
 class AttitudeEstimator(Protocol):
-    """The seam.  Only `update` is required of one's own class.
+    """The protocol of estimators; only `update` is required.
 
     Optional: ``heading_reference``, "course" (default) or "nose", what the heading converges to;
-    ``reset(on_ground)``, called at power-up with the mean inertial sample of the calibration window, or
-    with None where the flight starts in the air; ``uses``, names of the instruments that it can make something
-    of; and ``replay(rows)``, a whole log in one call, see `estimator.blocks.compiled`.
+    ``reset(on_ground)``, called at power-up with the mean inertial sample of the calibration window, or with None where
+    the flight starts in the air; ``uses``, names of the instruments that it uses; and ``replay(rows)``, a whole log in
+    one call, see `estimator.blocks.compiled`.
     """
 
     def update(self, m: Measurements) -> AttitudeEstimate:

@@ -1,46 +1,46 @@
-"""MatrixPilot's estimator in its present form (2017 and after): the paper's, with turns that need no GPS.
+"""MatrixPilot's estimator in its present form (since 2017): the paper's, with turns that need no GPS.
 
-Frames.  MatrixPilot's body axes are left wing, nose, down, its earth axes west, north, down.  Here everything is in
-our own axes: the equations are rewritten once and nothing is converted in flight, but for the force:
+Frames.  MatrixPilot's body axes are left wing, nose, down, its earth axes west, north, down.  Here all equations are
+rewritten for our axes; in flight only the specific force is converted:
 
     omega = (p, q, r) = (omega_y, -omega_x, omega_z),    a = gravity - acceleration = -force_b = (a_y, -a_x, a_z)
 
-What differs from the paper (Premerlani & Bizard)
--------------------------------------------------
-*Centrifugal acceleration without GPS* replaces Eqns 25-26.  It acts at right angles to nose and rate, so the gyros
-tell its direction u; its size ``w_V = |omega x V|`` is what makes the remaining force as long as gravity:
-``|a + w_V u| = g``.  Of the two roots the sign of the turn chooses; a steady level turn is a double root.  The
-direction is that of the rate as read, without the integral correction (with it, 2 degrees of tilt off the firmware).
-`centrifugal_from_gps` goes back to Eqns 25-26, with the speed through the air.
+Differences from the paper (Premerlani & Bizard)
+------------------------------------------------
+*Centrifugal acceleration without GPS* replaces Eqns 25-26.  It is perpendicular to nose and rate, so the gyros give its
+direction u; its size ``w_V = |omega x V|`` is the one that makes the remaining force as long as gravity:
+``|a + w_V u| = g``.  The sign of the turn selects one of the two roots; a steady level turn is a double root.  The
+direction is that of the measured rate, without the integral correction (with it, 2 degrees of tilt off the firmware).
+`centrifugal_from_gps` restores Eqns 25-26, with the speed through the air.
 
 *Forward acceleration* is the difference of the airspeed between two GPS reports, held until the next.
 
-*Yaw* meets the velocity through the air, not the course, once the wind is known.  The error is computed at a report
-and held in body axes until the next.  A report is taken for late by one report: course, speed and climb are
-carried on by their last change.  (In the firmware a speed so carried on below zero is a large unsigned one, and turns
-an aeroplane at rest; here it is zero.)
+*Yaw* is compared with the velocity through the air, not the course, once the wind is known.  The error is computed at a
+report and held in body axes until the next.  A report is assumed to be late by one report: course, speed and climb are
+extrapolated by their last change.  (In the firmware a speed extrapolated below zero becomes a large unsigned number,
+which turns an aeroplane at rest; here it is zero.)
 
-*Wind* from pairs of reports between which the nose turned: the change of velocity over the ground is that of the
-velocity through the air, whose direction the nose tells.  Yaw found late is a turn that the velocity does not
-make: it leaves a false wind of some metres per second that takes several turns to fade.
+*Wind* from pairs of reports between which the nose turned: the change of ground velocity equals that of the velocity
+through the air, whose direction is the nose's.  Yaw that is found late is a turn without a change of velocity: it
+leaves a false wind of some metres per second that takes several turns to fade.
 
-*Renormalisation* (2017) leaves the direction of the Z row as it is: E = D x N, then N = E x D, and Eqn 21.  The error
-of Eqn 17 then tilts the matrix as much as with Eqns 18-20 (`estimator.rotation.renormalise`), to the other side.
+*Renormalisation* (2017) keeps the direction of the Z row: E = D x N, then N = E x D, and Eqn 21.  The error of Eqn 17
+then tilts the matrix as much as with Eqns 18-20 (`estimator.rotation.renormalise`), in the other direction.
 
 *Rotation in a sample* is lengthened to its tangent: Eqn 17 then turns by the right angle.
 
-*Gains* rise with the spin rate; the integral rests while turning.  Eqn 27 stands here in the order that works,
-reference x estimate (see `estimator.premerlani`, Errata).
+*Gains* rise with the spin rate; the integral is held while turning.  Eqn 27 is used in the correct order, reference x
+estimate (see `estimator.premerlani`, Errata).
 
 Fixed point
 -----------
-`fixed_point` rounds as the 16-bit processor does: every stored number is a whole count, rounded to the nearest, to
-even where between (convergent), and saturated; the integral alone has 32 bits.  Matrix elements are 2.14; a product
-of two of them leaves the 1.15 arithmetic halved and is doubled again, so that 13 bits remain.  Angles of velocities
-have 8 bits.  The processor's sums are exact (40 bits).  Counts are those of the UDB4 board.
+`fixed_point` rounds as the 16-bit processor does: every stored number is an integer count, rounded to the nearest, ties
+to even (convergent), and saturated; only the integral has 32 bits.  Matrix elements are 2.14; the 1.15 arithmetic
+halves a product of two of them, which is then doubled, so that 13 bits remain.  Angles of velocities have 8 bits.  The
+processor's sums are exact (40 bits).  Counts are those of the UDB4 board.
 
-Left out: angle of attack in the compensation (a model of the wing that the firmware is told), the magnetometer, and
-dead reckoning, which the attitude does not use.
+Left out: angle of attack in the compensation (a wing model configured in the firmware), the magnetometer, and dead
+reckoning, which the attitude does not use.
 
 References
 ----------
@@ -53,7 +53,7 @@ import math
 import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
-from estimator.blocks.kernels import clip, wrap
+from estimator.blocks.kernels import clip, cross, put, wrap
 from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen, take_rate
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, Column, ImuSample
@@ -64,12 +64,12 @@ from estimator.params.matrixpilot import MatrixPilotParams as MatrixPilotParams
 from estimator.rotation import NEAR, level, propagate, renormalise
 
 BOOST_RAD_S, MOST_BOOST = math.radians(50.0), 10.0  # spin beyond which the gains rise, and how far
-LEARN_BELOW_RAD_S = math.radians(20.0)  # the integral rests while spinning faster
-GAIN_TIME_S, GAIN_RANGE = 10.0, 0.1  # how slowly, and how far from one, the gyros' gain is calibrated
-INTEGRAL_LIMIT_RAD_S = 18.0  # what its 16 bits hold: no limit in practice
-FIX_LIFE_S = 4.5  # reports further apart are no pair; an older one corrects nothing
+LEARN_BELOW_RAD_S = math.radians(20.0)  # the integral is held while spinning faster
+GAIN_TIME_S, GAIN_RANGE = 10.0, 0.1  # time constant and range of the gain calibration
+INTEGRAL_LIMIT_RAD_S = 18.0  # range of its 16 bits: no limit in practice
+FIX_LIFE_S = 4.5  # reports further apart form no pair; an older one is not used
 LEAST_AIRSPEED_M_S = 2.0  # slower through the air: the course over ground is the better reference
-LEAST_TURN = 0.4  # change of the unit nose between two reports that tells the wind
+LEAST_TURN = 0.4  # change of the unit nose between two reports that gives the wind
 WIND_PART = 1.0 / 16.0  # of each new measurement of the wind
 LOCK_RAD, LOCK_S = math.radians(15.0), 1.0  # yaw is found once it was this close for this long
 LONGEST_STEP_RAD = 0.1  # keeps the renormalised matrix within 5e-4 of a rotation
@@ -83,18 +83,18 @@ COURSE_COUNT_RAD = 2.0 * math.pi / 256.0
 
 _STATE = (
     Column("omega_p_b", (3,), "proportional rate correction"),
-    Column("omega_i_b", (3,), "integral rate correction; minus the offset still found"),
+    Column("omega_i_b", (3,), "integral rate correction; minus the offset learnt since"),
     Column("gyro_gain", (3,), "true rate over corrected reading, near one"),
     Column("spin_rad_s", (), "length of the corrected rate"),
     Column("g_ref_b", (3,), "reference of gravity, in units of gravity"),
-    Column("turn_m_s2", (), "centrifugal acceleration |omega x V| that was found"),
+    Column("turn_m_s2", (), "centrifugal acceleration |omega x V|"),
     Column("roll_pitch_b", (3,), "error of down"),
     Column("yaw_b", (3,), "error of yaw, held from report to report"),
-    Column("fixes", (), "reports in unbroken succession, up to two", integer=True),
+    Column("fixes", (), "successive reports, up to two", integer=True),
     Column("fix_age_s", (), "time since the last report"),
     Column("report", (3,), "course [rad], ground speed and sink rate [m/s] of the last report"),
-    Column("down_m", (), "height of the last report, positive down, where it takes the place of a sink rate"),
-    Column("v_e_m_s", (3,), "velocity over the ground, carried on to the present"),
+    Column("down_m", (), "height of the last report, positive down, where it replaces the sink rate"),
+    Column("v_e_m_s", (3,), "ground velocity, extrapolated to the present"),
     Column("airspeed_m_s", (), "length of that less the wind"),
     Column("forward_m_s2", (), "change of airspeed between the last two reports"),
     Column("nose_then", (3,), "nose of the last report that began a pair for the wind"),
@@ -108,7 +108,7 @@ STATE_DTYPE = state_dtype(MatrixPilotParams, *_STATE)
 
 @kernel
 def stored(x, count):  # type: ignore[no-untyped-def]
-    """`x` as 16 bits of `count` hold it: convergent rounding and saturation."""
+    """`x` as stored in 16 bits of `count`: convergent rounding and saturation."""
     return count * clip(np.rint(x * (1.0 / count)), -32768.0, 32767.0)
 
 
@@ -124,7 +124,7 @@ def centrifugal(a, q, r, tilt):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     a : shape (3,)     gravity minus acceleration, body axes
-    q, r : float       pitch and yaw rate as read, without the integral correction
+    q, r : float       measured pitch and yaw rate, without the integral correction
     tilt : shape (3,)  Z row of the attitude
 
     Returns
@@ -146,7 +146,7 @@ def centrifugal(a, q, r, tilt):  # type: ignore[no-untyped-def]
 
 @kernel
 def gravity_reference(row, s):  # type: ignore[no-untyped-def]
-    """Fill ``s.g_ref_b``: the accelerometer freed of centrifugal and forward acceleration."""
+    """Fill ``s.g_ref_b``: the accelerometer less centrifugal and forward acceleration."""
     f, w, g = row.force_b_m_s2, s.omega_b_rad_s, s.g_ref_b
     for i in range(3):
         g[i] = -f[i] / G_M_S2  # gravity minus acceleration
@@ -167,28 +167,17 @@ def gravity_reference(row, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _cross_rows(R, i, j, k):  # type: ignore[no-untyped-def]
-    """Set row `i` to row `j` x row `k`."""
-    x = R[j, 1] * R[k, 2] - R[j, 2] * R[k, 1]
-    y = R[j, 2] * R[k, 0] - R[j, 0] * R[k, 2]
-    R[i, 2] = R[j, 0] * R[k, 1] - R[j, 1] * R[k, 0]
-    R[i, 0], R[i, 1] = x, y
-
-
-@kernel
 def renormalise_keeping_tilt(R_eb, fixed_point):  # type: ignore[no-untyped-def]
-    """Bring the matrix back to a rotation, in place, the direction of the Z row as it is; False if it cannot be."""
-    _cross_rows(R_eb, 1, 2, 0)  # E = D x N
-    _cross_rows(R_eb, 0, 1, 2)  # N = E x D
+    """Bring the matrix back to a rotation, in place, keeping the direction of the Z row; False if lost."""
+    put(R_eb[1], 1.0, cross(R_eb[2], R_eb[0]))  # E = D x N
+    put(R_eb[0], 1.0, cross(R_eb[1], R_eb[2]))  # N = E x D
     for i in range(3):
         if fixed_point:
             _store(R_eb[i], MATRIX_COUNT)
         square = R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2
         if not abs(square - 1.0) < 0.1:  # no longer within reach of Eqn 21
             return renormalise(R_eb)
-        scale = 1.5 - 0.5 * square if abs(square - 1.0) < NEAR else 1.0 / np.sqrt(square)  # Eqn 21
-        for j in range(3):
-            R_eb[i, j] *= scale
+        put(R_eb[i], 1.5 - 0.5 * square if abs(square - 1.0) < NEAR else 1.0 / np.sqrt(square), R_eb[i])  # Eqn 21
         if fixed_point:
             _store(R_eb[i], MATRIX_COUNT)
     return True
@@ -233,7 +222,7 @@ def roll_pitch_error(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_report(row, s):  # type: ignore[no-untyped-def]
-    """Take a GPS report: velocity carried on by one report, forward acceleration, wind, yaw error."""
+    """Take a GPS report: extrapolated velocity, forward acceleration, wind, yaw error."""
     s.fix_age_s += s.dt_s
     if s.fix_age_s > FIX_LIFE_S and s.fixes > 0:  # lost: no pair, no yaw
         s.fixes = s.pair_begun = 0
@@ -263,7 +252,7 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def carry_on(course, speed, sink, s):  # type: ignore[no-untyped-def]
-    """Set ``s.v_e_m_s``: the report, and its change since the one before once more."""
+    """Set ``s.v_e_m_s``: the report plus its change since the previous one."""
     if s.fixed_point:
         course = np.rint(course / COURSE_COUNT_RAD) * COURSE_COUNT_RAD
         speed, sink = stored(speed, SPEED_COUNT_M_S), stored(sink, SPEED_COUNT_M_S)
@@ -348,7 +337,7 @@ def feed_back(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def step(rows, k, state):  # type: ignore[no-untyped-def]
-    """One pass of the algorithm over row `k`; returns the `Health`."""
+    """One pass over row `k`; returns the `Health`."""
     row, s = rows[k], state[0]
     good = screen(row, s)
     if good:
@@ -379,7 +368,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class MatrixPilot(Compiled[MatrixPilotParams]):
-    """MatrixPilot's present form of Premerlani and Bizard: turns need no GPS; see the module."""
+    """MatrixPilot since 2017: Premerlani and Bizard with a centrifugal term that needs no GPS."""
 
     heading_reference = "nose"
     _step, _replay, _dtype = staticmethod(step), staticmethod(_replay), STATE_DTYPE

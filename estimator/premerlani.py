@@ -1,51 +1,50 @@
-"""The direction-cosine-matrix estimator of Premerlani and Bizard: gyros steer, accelerometer and GPS correct.
+"""The direction-cosine-matrix estimator of Premerlani and Bizard: gyros integrated, accelerometer and GPS correct.
 
-One pass per inertial sample, in the paper's order: integrate the gyros (Eqns 16-17), renormalise (18-21), compare
-the nose with the course over ground (22-24) and the down axis with the accelerometer freed of centrifugal
-acceleration (25-27), and feed both errors back through one PI controller (28-29).
+One pass per inertial sample, in the paper's order: integrate the gyros (Eqns 16-17), renormalise (18-21), compare the
+nose with the course over ground (22-24) and the down axis with the accelerometer less centrifugal acceleration (25-27),
+and feed both errors back through one PI controller (28-29).
 
 Errata
 ------
 *Eqn 27.*  The paper prints the roll-pitch correction as ``r_z x g_reference``.  With the update of Eqn 17 that
-drives the estimate away: 9 degrees of tilt become 180.  The right form is ``g_reference x r_z``.  Which factor
-comes first depends on where the vector is fixed.  The nose is fixed in the body and is compared in the earth
-frame: there estimate x reference is the rotation still wanted (Eqn 23 is right).  Down is fixed in the earth and
-is compared in the body frame, which turns the other way round: there it is reference x estimate.
+diverges: 9 degrees of tilt become 180.  ``g_reference x r_z`` is right.  The order depends on the frame in which the
+vector is fixed.  The nose is fixed in the body and compared in the earth frame: there estimate x reference is the
+rotation still needed (Eqn 23 is right).  Down is fixed in the earth and compared in the body frame, which turns the
+other way: there it is reference x estimate.
 
-*Eqn 25.*  ``omega`` is the gyro with the integral correction, without the proportional one: that is a
-correction of attitude, no rotation of the aeroplane, and would be taken for centrifugal acceleration.
+*Eqn 25.*  ``omega`` is the gyro with the integral correction, without the proportional one: that one corrects the
+attitude, the aeroplane does not turn by it, and it would count as centrifugal acceleration.
 
 *Eqn 20* prints the Z row's elements as ``r_xx r_xy r_xz``; read ``r_zx r_zy r_zz``.
 
 Beyond the paper
 ----------------
-Each but the yaw lock has a parameter that turns it off.
+Each has a parameter that turns it off, but the yaw lock.
 
 *GPS-lag filter* (`estimator.blocks.gps_lag`; the paper names it, without equations).  The nose passes the receiver's
-own filter and latency before it meets the course.  A vector filter also shrinks the speed of a turning aeroplane: it is
-divided by the length of the equally filtered nose.  `rotate_history` takes the lag out of the feedback loop.
+filter and latency before it is compared with the course.  Filtering a vector also shrinks the speed of a turning
+aeroplane: it is divided by the length of the equally filtered nose.  `rotate_history` takes the lag out of the loop.
 
-*Yaw lock.*  The cross product of Eqn 23 fades beyond 90 degrees of error and vanishes at 180.  Beyond 90 its
-sign is kept and its size is one.
+*Yaw lock.*  The cross product of Eqn 23 decreases beyond 90 degrees of error and vanishes at 180.  Beyond 90 degrees
+only its sign is used, with full size.
 
-*No learning in turns.*  In a turn the course lags and the crab changes: the yaw error takes the sign of the turn,
-and so does the bank through which Eqn 24 passes it to the pitch axis.  Their product has one sign, left or right:
-an integral that kept running would learn it as an offset of the pitch gyro.
+*No learning in turns.*  In a turn the course lags and the crab changes: the yaw error has the sign of the turn, and so
+has the bank through which Eqn 24 passes it to the pitch axis.  Their product has the same sign left and right: the
+integral would learn it as an offset of the pitch gyro.
 
-*Launch gate.*  While the length of ``g_reference`` is not that of gravity, forward acceleration or a wrong speed
-is in it: no roll-pitch correction then.
+*Launch gate.*  While the length of ``g_reference`` is not that of gravity, it contains forward acceleration or a wrong
+speed: no roll-pitch correction then.
 
 *Speed through the air.*  In wind the ground speed of Eqn 25 is not the speed that turns the aeroplane.  The best
-that there is takes its place: the airspeed sensor's where one reports; with `turn_speed` what level turns tell (a
-turn about the vertical accelerates horizontally: the speed for which ``g_reference`` is at right angles to
-``omega x V``; MatrixPilot took to such a speed in 2017); with `learn_wind` ground velocity less wind.
+available speed is used: that of the airspeed sensor; with `turn_speed` one learnt in level turns (a turn about the
+vertical accelerates horizontally: the speed for which ``g_reference`` is at right angles to ``omega x V``; MatrixPilot
+has used such a speed since 2017); with `learn_wind` ground velocity less wind.
 
 *Wind* (off by default; the paper: "somehow compute the wind vector").  Learnt in turns, `estimator.blocks.wind`.  The
 reference of Eqn 22 is then the direction of ground velocity less wind, and the heading converges to the nose.
 
-*Saturation* (the paper: "error will be introduced into the roll-pitch orientation").  A clipped axis says no more
-than that it is clipped: what the estimate itself expects stands in for it, and only the other axes steer.  The full
-scale of the accelerometer is known from its data sheet.
+*Saturation* (the paper: "error will be introduced into the roll-pitch orientation").  A clipped axis is replaced by the
+value that the estimate expects, so that only the other axes correct.  The full scale comes from the data sheet.
 
 *Yaw lock after the launch* (the paper: "a large weight"; off by default).  A larger weight until yaw is locked.
 
@@ -67,7 +66,7 @@ from estimator.blocks.gps_lag import (
     start_history,
     turn_frame,
 )
-from estimator.blocks.kernels import clip
+from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
 from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen
 from estimator.blocks.wind import WIND_FILTER, learn_wind
@@ -77,28 +76,28 @@ from estimator.params.premerlani import LEAST_CLIP_M_S2
 from estimator.params.premerlani import PremerlaniParams as PremerlaniParams
 from estimator.rotation import integrate
 
-FIX_LIFE_S = 2.0  # an older fix corrects nothing any more
-AIR_LIFE_S = 1.0  # nor does an older airspeed
+FIX_LIFE_S = 2.0  # an older fix is not used
+AIR_LIFE_S = 1.0  # nor is an older airspeed
 LOCK_TAN, LOCK_S = math.tan(math.radians(15.0)), 1.0  # yaw is locked once it was this close for this long
-TURN_RAD_S, TURN_S = 0.3, 3.0  # slowest turn that tells a speed, and how slowly it is believed
-SHORTEST_NOSE = 0.3  # a shorter filtered nose (a loop, a spin) restores no speed
+TURN_RAD_S, TURN_S = 0.3, 3.0  # slowest turn that gives a speed, and time constant of learning it
+SHORTEST_NOSE = 0.3  # a shorter filtered nose (a loop, a spin) cannot restore the speed
 CLIPPED = 0.99  # of the full scale: the largest count of 8 bits is 0.992 of it
 
 
 _STATE = (
     Column("omega_p_b", (3,), "proportional rate correction, Eqn 29"),
-    Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset still found"),
+    Column("omega_i_b", (3,), "integral rate correction, Eqn 29; minus the offset learnt since"),
     Column("omega_total_b", (3,), "corrected rate that is integrated, Eqn 16"),
     Column("roll_pitch_b", (3,), "roll-pitch correction, Eqn 27"),
     Column("yaw_b", (3,), "yaw correction, Eqn 24"),
     Column("total_b", (3,), "weighted sum, Eqn 28"),
-    Column("learning", (), "1 where the integral takes the total of this sample", integer=True),
+    Column("learning", (), "1 where the integral uses the total of this sample", integer=True),
     Column("g_ref_b_m_s2", (3,), "reference of gravity, Eqn 26"),
     Column("largest_b_m_s2", (3,), "largest reading of each accelerometer axis"),
-    Column("may_clip", (), "1 where the end of the scale is known or looked for", integer=True),
+    Column("may_clip", (), "1 where the full scale is known or searched for", integer=True),
     Column("clipped", (), "which axes are clipped: 1 x, 2 y, 4 z", integer=True),
     Column("speed_m_s", (), "speed of Eqn 25 from the last fix"),
-    Column("turn_speed_m_s", (), "the same learnt in turns, 0 until then"),
+    Column("turn_speed_m_s", (), "the same, learnt in turns; 0 before"),
     Column("airspeed_m_s", (), "the same from the last air-data sample"),
     Column("air_age_s", (), "time since that"),
     Column("course", (2,), "COGX, COGY of the last fix, Eqn 22"),
@@ -111,7 +110,7 @@ STATE_DTYPE = state_dtype(PremerlaniParams, *WIND_FILTER, *LAG, *_STATE)
 
 @inlined
 def take_air(row, s):  # type: ignore[no-untyped-def]
-    """Take the airspeed of an air-data sample that arrived."""
+    """Take an airspeed that arrived."""
     s.air_age_s += s.dt_s
     if s.use_airspeed and airspeed_came(row, s) and row.airspeed_m_s > 0.0:
         s.airspeed_m_s = row.airspeed_m_s
@@ -120,7 +119,7 @@ def take_air(row, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def take_fix(row, s):  # type: ignore[no-untyped-def]
-    """Take a fix that arrived, if it is one."""
+    """Take a fix that arrived, if it is plausible."""
     s.fix_age_s += s.dt_s
     if row.gps_new:
         if abs(row.gps_course_rad) < 100.0 and 0.0 <= row.gps_speed_m_s < 1000.0:
@@ -147,7 +146,7 @@ def believe_fix(course_rad, speed_m_s, s):  # type: ignore[no-untyped-def]
             north, east = north - s.wind_e_m_s[0], east - s.wind_e_m_s[1]
     speed = np.sqrt(north * north + east * east)
     s.speed_m_s = speed
-    if s.gps_lag_filter:  # the filter that shortened the nose shortened the velocity alike
+    if s.gps_lag_filter:  # the filter shortened the nose and the velocity alike
         s.speed_m_s /= clip(nose_length(s), SHORTEST_NOSE, 1.0)
     if speed >= s.min_speed_m_s:
         s.fix_age_s = 0.0
@@ -156,7 +155,7 @@ def believe_fix(course_rad, speed_m_s, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def yaw_correction(s):  # type: ignore[no-untyped-def]
-    """Fill ``s.yaw_b`` (Eqns 23 and 24), zero without a fresh fix; returns its weight."""
+    """Fill ``s.yaw_b`` (Eqns 23 and 24), zero without a fresh fix; return its weight."""
     ground = 0.0
     if s.fix_age_s <= FIX_LIFE_S:
         x, y = corrected_nose(s)
@@ -165,7 +164,7 @@ def yaw_correction(s):  # type: ignore[no-untyped-def]
         s.near_s = s.near_s + s.dt_s if abs(ground) < LOCK_TAN * along else 0.0
         if s.near_s >= LOCK_S:
             s.locked = 1
-        if along < 0.0:  # more than a right angle off: full strength
+        if along < 0.0:  # more than a right angle off: full size
             ground = np.copysign(np.sqrt(x * x + y * y), ground)
     weight = s.w_y if s.locked else max(s.w_y, s.w_y_until_lock)
     for i in range(3):
@@ -177,14 +176,14 @@ def yaw_correction(s):  # type: ignore[no-untyped-def]
 
 @inlined
 def find_clipped(f, s):  # type: ignore[no-untyped-def]
-    """Set ``s.clipped``: axes at the end of the scale, given or found."""
+    """Set ``s.clipped``: axes at full scale, given or found."""
     s.clipped = 0
     for i in range(3):
         size = abs(f[i])
         if size >= s.clip_m_s2:
             s.clipped |= 1 << i
         if s.find_clip and size >= s.largest_b_m_s2[i]:
-            # Readings that are no end of the scale do not come twice to the last digit, except at rest.
+            # Other readings than the full scale do not occur twice to the last digit, except at rest.
             if size == s.largest_b_m_s2[i] and size > LEAST_CLIP_M_S2:
                 s.clipped |= 1 << i
             s.largest_b_m_s2[i] = size
@@ -192,13 +191,13 @@ def find_clipped(f, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def learn_turn_speed(f, s):  # type: ignore[no-untyped-def]
-    """Learn the speed that makes Eqn 25's acceleration horizontal, while the turn is about the vertical."""
+    """Learn the speed that makes the acceleration of Eqn 25 horizontal, turning about the vertical."""
     w, v = s.omega_b_rad_s, s.speed_m_s
     around = w[0] * s.R_eb[2, 0] + w[1] * s.R_eb[2, 1] + w[2] * s.R_eb[2, 2]
     across = w[1] * w[1] + w[2] * w[2]  # |omega x nose|^2
     if v < s.min_speed_m_s or across < TURN_RAD_S**2 or around * around < 0.8 * (across + w[0] * w[0]):
         return
-    # Level, g_ref stands upright on omega x nose = (0, w_z, -w_y): (-f + V omega x nose) . (omega x nose) = 0.
+    # Level, g_ref is perpendicular to omega x nose = (0, w_z, -w_y): (-f + V omega x nose) . (omega x nose) = 0.
     felt = clip((f[1] * w[2] - f[2] * w[1]) / across, 0.0, 3.0 * v)
     if s.turn_speed_m_s == 0.0:
         s.turn_speed_m_s = v
@@ -220,7 +219,7 @@ def speed_through_air(f, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
-    """Fill ``s.roll_pitch_b`` (Eqns 25 to 27, the last with its sign put right); zero outside the launch gate."""
+    """Fill ``s.roll_pitch_b`` (Eqns 25 to 27, the last with its sign corrected); zero outside the launch gate."""
     f, w, g = row.force_b_m_s2, s.omega_b_rad_s, s.g_ref_b_m_s2
     if s.may_clip:
         find_clipped(f, s)
@@ -229,26 +228,22 @@ def roll_pitch_correction(row, s):  # type: ignore[no-untyped-def]
     g[0] = -f[0]  # Eqn 26
     g[1] = -f[1] + w[2] * v
     g[2] = -f[2] - w[1] * v
-    x, y, z = s.R_eb[2, 0], s.R_eb[2, 1], s.R_eb[2, 2]
     if s.clipped:
         for i in range(3):
             g[i] = G_M_S2 * s.R_eb[2, i] if s.clipped & (1 << i) else g[i]
-    length = np.sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2])
-    believed = length > 0.0 and abs(length / G_M_S2 - 1.0) <= s.launch_gate
-    scale = 1.0 / length if believed else 0.0
-    s.roll_pitch_b[0] = scale * (g[1] * z - g[2] * y)  # Eqn 27, corrected: reference x estimate
-    s.roll_pitch_b[1] = scale * (g[2] * x - g[0] * z)
-    s.roll_pitch_b[2] = scale * (g[0] * y - g[1] * x)
+    length = np.sqrt(dot(g, g))
+    plausible = length > 0.0 and abs(length / G_M_S2 - 1.0) <= s.launch_gate
+    put(s.roll_pitch_b, 1.0 / length if plausible else 0.0, cross(g, s.R_eb[2]))  # Eqn 27, corrected
 
 
 @inlined
 def step(rows, k, state):  # type: ignore[no-untyped-def]
-    """One pass of the algorithm over row `k`; returns the `Health`."""
+    """One pass over row `k`; returns the `Health`."""
     row, s = rows[k], state[0]
     good = screen(row, s)
     if good:
         corrected_rate(row, s, good)
-        if s.learning:  # from the sample before: the processor need not wait for it, and it changes slowly
+        if s.learning:  # of the previous sample: the processor need not wait for it, and it changes slowly
             learn_offset(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_i_b)
         if not integrate(s.R_eb, s.omega_total_b, s.dt_s):  # Eqns 17-21
             s.locked = 0
@@ -274,7 +269,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Premerlani(Compiled[PremerlaniParams]):
-    """Premerlani and Bizard (2009): gyros, centrifugal term, yaw by the GPS course; see the module."""
+    """Premerlani and Bizard (2009): gyros, centrifugal term, yaw from the GPS course."""
 
     heading_reference: HeadingReference = "course"  # "nose" with `learn_wind`
     uses = ("gyro", "accelerometer", "gps", "airspeed")

@@ -1,7 +1,7 @@
-"""The algebra of the direction cosine matrix: Eqns 2 and 17-21 of the paper, and how far two attitudes are apart.
+"""Direction cosine matrices: Eqns 2 and 17-21 of the paper, conversions, and errors between two attitudes.
 
-The kernels that run every tick work in place on one matrix.  The functions for logs and people take one matrix
-``(3, 3)`` or any stack of them ``(..., 3, 3)``.
+The kernels that run every tick work in place on one matrix.  The other functions take one matrix ``(3, 3)`` or any
+stack of them ``(..., 3, 3)``.
 
 References
 ----------
@@ -11,13 +11,13 @@ W. Premerlani and P. Bizard, "Direction Cosine Matrix IMU: Theory", 2009.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.blocks.kernels import cross, dot, plus, wrap
+from estimator.blocks.kernels import cross, dot, plus, put, wrap
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import Array
 
 NEAR = 0.02  # within this of a unit length (squared) or of a right angle (cosine), Eqns 19 and 21 are good to 3e-4
-LONGEST_STEP_RAD = 0.2  # Eqn 17 wants steps that change little
-HOPELESS = 1e-6  # rows this short, or this parallel, no longer say where an axis points
+LONGEST_STEP_RAD = 0.2  # Eqn 17 holds for small steps
+HOPELESS = 1e-6  # rows this short, or this parallel, no longer define an axis
 
 
 @inlined
@@ -39,13 +39,8 @@ def propagate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _set_row(R, i, row, scale):  # type: ignore[no-untyped-def]
-    R[i, 0], R[i, 1], R[i, 2] = scale * row[0], scale * row[1], scale * row[2]
-
-
-@inlined
 def _to_unit(row):  # type: ignore[no-untyped-def]
-    """What a row is to be multiplied by for unit length: Eqn 21 near it, the reciprocal of its length elsewhere."""
+    """Factor that gives a row unit length: Eqn 21 near it, else the reciprocal of the length."""
     squared = dot(row, row)
     return 0.5 * (3.0 - squared) if abs(squared - 1.0) < NEAR else 1.0 / np.sqrt(squared)
 
@@ -54,12 +49,12 @@ def _to_unit(row):  # type: ignore[no-untyped-def]
 def renormalise(R_eb):  # type: ignore[no-untyped-def]
     """Bring the matrix back to a rotation, in place (Eqns 18-21).
 
-    Eqns 19 and 21 hold for small errors.  A matrix further off than `NEAR` is put right by exact
-    orthogonalisation (Gram-Schmidt on the X and Y rows) instead.
+    Eqns 19 and 21 hold for small errors.  A matrix further off than `NEAR` is orthogonalised exactly
+    (Gram-Schmidt on the X and Y rows).
 
-    What Eqn 17 leaves is not removed without a trace.  Eqn 20 has the Z row alone bear its errors against X and Y,
-    and that tilts the matrix: at a rate with a vertical part w_v and a horizontal part w_h (earth axes) by
-    w_v w_h dt / 2 a second, in quick aerobatics at 50 Hz about a degree a second.
+    Renormalisation leaves a small error.  Eqn 20 puts the error of Eqn 17 against X and Y into the Z row alone, which
+    tilts the matrix: at a rate with a vertical part w_v and a horizontal part w_h (earth axes) by w_v w_h dt / 2 per
+    second, in fast aerobatics at 50 Hz about a degree per second.
 
     Parameters
     ----------
@@ -67,8 +62,8 @@ def renormalise(R_eb):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    bool    False where nothing can be saved (not finite, or X and Y rows vanishing or parallel); the matrix is
-            then left as it was, and the caller restarts from an attitude it trusts
+    bool    False if the matrix is lost (not finite, or X and Y rows vanishing or parallel); it is then unchanged,
+            and the caller restarts from an attitude it trusts
     """
     x, y = (R_eb[0, 0], R_eb[0, 1], R_eb[0, 2]), (R_eb[1, 0], R_eb[1, 1], R_eb[1, 2])
     xx, yy, error = dot(x, x), dot(y, y), dot(x, y)  # Eqn 18
@@ -76,48 +71,41 @@ def renormalise(R_eb):  # type: ignore[no-untyped-def]
         return _orthogonalise(R_eb, xx, yy, error)
     x, y = plus(x, -0.5 * error, y), plus(y, -0.5 * error, x)  # Eqn 19
     z = cross(x, y)  # Eqn 20
-    _set_row(R_eb, 0, x, _to_unit(x))  # Eqn 21
-    _set_row(R_eb, 1, y, _to_unit(y))
-    _set_row(R_eb, 2, z, _to_unit(z))
+    put(R_eb[0], _to_unit(x), x)  # Eqn 21
+    put(R_eb[1], _to_unit(y), y)
+    put(R_eb[2], _to_unit(z), z)
     return True
 
 
 @kernel
 def _orthogonalise(R_eb, xx, yy, error):  # type: ignore[no-untyped-def]
-    """Gram-Schmidt on the X and Y rows, whose dot products are given; answers as `renormalise` does."""
-    # Written so that NaN is hopeless too; 1 - cosine^2 is the squared sine between the two rows.
+    """Gram-Schmidt on the X and Y rows, whose dot products are given; returns as `renormalise` does."""
+    # NaN fails too; 1 - cosine^2 is the squared sine between the two rows.
     if not (HOPELESS < xx < 1.0 / HOPELESS and HOPELESS < yy < 1.0 / HOPELESS):
         return False
     if not 1.0 - error * error / (xx * yy) > HOPELESS:
         return False
-    _set_row(R_eb, 0, R_eb[0], 1.0 / np.sqrt(xx))
+    put(R_eb[0], 1.0 / np.sqrt(xx), R_eb[0])
     y = plus(R_eb[1], -dot(R_eb[0], R_eb[1]), R_eb[0])
-    _set_row(R_eb, 1, y, 1.0 / np.sqrt(dot(y, y)))
-    _set_row(R_eb, 2, cross(R_eb[0], R_eb[1]), 1.0)
+    put(R_eb[1], 1.0 / np.sqrt(dot(y, y)), y)
+    put(R_eb[2], 1.0, cross(R_eb[0], R_eb[1]))
     return True
 
 
 @kernel
 def renormalise_exactly(R_eb):  # type: ignore[no-untyped-def]
-    """Bring the matrix back to a rotation, in place, each row by its exact length; False if hopeless.
+    """Bring the matrix back to a rotation, in place, each row by its exact length; False if lost.
 
     J. van Zundert et al., "Direction cosine matrix based IMU implementation in Matlab/Simulink", 2013, Eqns 2.4-2.6.
     """
-    error = R_eb[0, 0] * R_eb[1, 0] + R_eb[0, 1] * R_eb[1, 1] + R_eb[0, 2] * R_eb[1, 2]
-    for j in range(3):
-        x, y = R_eb[0, j], R_eb[1, j]
-        R_eb[0, j] = x - 0.5 * error * y  # Eqn 2.4
-        R_eb[1, j] = y - 0.5 * error * x
-    R_eb[2, 0] = R_eb[0, 1] * R_eb[1, 2] - R_eb[0, 2] * R_eb[1, 1]  # Eqn 2.5
-    R_eb[2, 1] = R_eb[0, 2] * R_eb[1, 0] - R_eb[0, 0] * R_eb[1, 2]
-    R_eb[2, 2] = R_eb[0, 0] * R_eb[1, 1] - R_eb[0, 1] * R_eb[1, 0]
+    error = dot(R_eb[0], R_eb[1])
+    x, y = plus(R_eb[0], -0.5 * error, R_eb[1]), plus(R_eb[1], -0.5 * error, R_eb[0])  # Eqn 2.4
+    rows = (x, y, cross(x, y))  # Eqn 2.5
     for i in range(3):
-        length = np.sqrt(R_eb[i, 0] ** 2 + R_eb[i, 1] ** 2 + R_eb[i, 2] ** 2)
+        length = np.sqrt(dot(rows[i], rows[i]))
         if not 1e-6 < length < 1e6:
             return False
-        scale = 1.0 / length
-        for j in range(3):
-            R_eb[i, j] *= scale  # Eqn 2.6
+        put(R_eb[i], 1.0 / length, rows[i])  # Eqn 2.6
     return True
 
 
@@ -131,9 +119,9 @@ def level(R_eb):  # type: ignore[no-untyped-def]
 
 @inlined
 def integrate(R_eb, omega_b_rad_s, dt_s):  # type: ignore[no-untyped-def]
-    """Propagate and renormalise, in place, in as many parts as Eqn 17 needs (one, up to 0.2 rad in a sample).
+    """Propagate and renormalise, in place, in as many steps as Eqn 17 needs (one, up to 0.2 rad per sample).
 
-    Never leaves the rotations: a matrix that cannot be saved becomes level, and the answer is then False.
+    The result is always a rotation: a matrix that is lost becomes level, and the function returns False.
     """
     angle_squared = dt_s * dt_s * dot(omega_b_rad_s, omega_b_rad_s)
     if angle_squared > LONGEST_STEP_RAD**2:
@@ -164,7 +152,7 @@ def exp(rotation_vector: Array) -> Array:
     angle = np.sqrt(squared)
     if angle > 1e-4:
         a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / squared
-    else:  # the series, where the quotients lose their digits
+    else:  # the series, where the quotients lose digits
         a, b = 1.0 - squared / 6.0, 0.5 - squared / 24.0
     R = np.empty((3, 3))
     R[0, 0], R[0, 1], R[0, 2] = 1.0 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y
@@ -175,7 +163,7 @@ def exp(rotation_vector: Array) -> Array:
 
 @kernel
 def log(R: Array) -> Array:
-    """Rotation vector of `R`, shape (3,), length 0..pi: the inverse of `exp`, good right up to half a turn."""
+    """Rotation vector of `R`, shape (3,), length 0..pi: the inverse of `exp`, accurate up to half a turn."""
     v = np.empty(3)
     v[0], v[1], v[2] = 0.5 * (R[2, 1] - R[1, 2]), 0.5 * (R[0, 2] - R[2, 0]), 0.5 * (R[1, 0] - R[0, 1])
     sine = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
@@ -183,7 +171,7 @@ def log(R: Array) -> Array:
     angle = np.arctan2(sine, cosine)
     if cosine > -0.5:
         return v * (angle / sine) if sine > 1e-10 else v
-    # Near half a turn the sine fades: take the axis from the symmetric part, n n^T (1 - cos), its sign from v.
+    # Near half a turn the sine vanishes: take the axis from the symmetric part, n n^T (1 - cos), its sign from v.
     i = 0
     for j in range(1, 3):
         if R[j, j] > R[i, i]:
@@ -207,7 +195,7 @@ def from_euler(roll_rad: ArrayLike, pitch_rad: ArrayLike, yaw_rad: ArrayLike) ->
 
 
 def to_euler(R_eb: Array) -> tuple[Array, Array, Array]:
-    """Roll, pitch, yaw [rad] of Eqn 2, each of shape (...); for people to read, never to compute with."""
+    """Roll, pitch, yaw [rad] of Eqn 2, each of shape (...); for display, not for computation."""
     pitch = np.arctan2(-R_eb[..., 2, 0], np.hypot(R_eb[..., 0, 0], R_eb[..., 1, 0]))
     roll = np.arctan2(R_eb[..., 2, 1], R_eb[..., 2, 2])
     return roll, pitch, heading_rad(R_eb)
@@ -231,7 +219,7 @@ def heading_error_rad(R_estimated_eb: Array, R_true_eb: Array) -> Array:
 
 
 def rotation_error_rad(R_estimated_eb: Array, R_true_eb: Array) -> Array:
-    """Angle of the one rotation that separates the two attitudes (geodesic on SO(3)), 0..pi, shape (...)."""
-    # ||A - B||_F = 2 sqrt(2) sin(angle / 2), and ||A + B||^2 completes it to the cosine: no lost digits anywhere.
+    """Angle of the rotation between the two attitudes (geodesic on SO(3)), 0..pi, shape (...)."""
+    # ||A - B||_F = 2 sqrt(2) sin(angle / 2), and ||A + B||^2 gives the cosine: accurate at all angles.
     apart = np.sum((R_estimated_eb - R_true_eb) ** 2, axis=(-2, -1)) / 8.0
     return np.asarray(2.0 * np.arctan2(np.sqrt(apart), np.sqrt(np.maximum(1.0 - apart, 0.0))))

@@ -1,16 +1,16 @@
 """Starlino's complementary filter on the direction cosine matrix: a weighted mean of small rotations.
 
-Gyro, accelerometer and magnetometer each say by what small angle the earth has turned, seen from the body, since the
-last sample; the matrix turns by their weighted mean and is made orthonormal again.  No integral: what the gyro reads
-too much after the calibration at power-up is outweighed, never learnt.  No centrifugal force: the accelerometer is
-taken for the vertical, with less weight the further its length is from that of gravity.
+Gyro, accelerometer and magnetometer each give a small angle by which the earth has turned, seen from the body, since
+the last sample; the matrix turns by their weighted mean and is made orthonormal again.  There is no integral: a gyro
+offset left by the calibration is outweighed, never learnt.  There is no centrifugal term: the accelerometer counts as
+the vertical, with less weight the further its length is from gravity.
 
 Frame
 -----
 The tutorial's earth is North-West-Up: the rows of its matrix are I (north), J (west) and K (zenith), seen from the
-body.  Inside this module that matrix is ``dcm``; it becomes ``R_eb``, north-east-down, in `to_north_east_down` and
-nowhere else.  Body axes need no conversion: the tutorial's are any right-handed three.  The accelerometer at rest
-points to the zenith where it is our specific force (K = f / g); the tutorial's output A has gravity's sign (K = -A).
+body.  Inside this module that matrix is ``dcm``; only `to_north_east_down` converts it to ``R_eb``, north-east-down.
+Body axes need no conversion: the tutorial's are any right-handed three.  At rest our specific force points to the
+zenith (K = f / g); the tutorial's output A has the sign of gravity (K = -A).
 
 Errata
 ------
@@ -19,20 +19,19 @@ the world turns about the device, and turns K by ``dtheta_g x K``.  A gyro measu
 turns the other way.  As printed, the matrix turns backwards.  Starlino's own code has the minus sign: dtheta_g = -w dt.
 
 *Weights* (Part 4; comments 52, 115, 116).  ``(s_a a + s_g g + s_m m) / (s_a + s_g + s_m)`` also divides by the weights
-of instruments that see nothing of a rotation: an accelerometer nothing about K, a magnetometer nothing about I.  A
-turn about the vertical comes out short by s_a / (s_a + s_g), a twentieth.  The tutorial's note for advanced readers
-says what works, and it is done here for both: about each axis of the earth the mean goes over those that can tell.
+of instruments that cannot see a rotation: the accelerometer about K, the magnetometer about I.  A turn about the
+vertical comes out short by s_a / (s_a + s_g), a twentieth.  The tutorial's note for advanced readers has the solution,
+used here for both: about each axis of the earth the mean is over the instruments that can see it.
 
-*West* (comments 16, 108).  ``W = A x M`` points west where A is the zenith, and east where A has gravity's sign;
+*West* (comments 16, 108).  ``W = A x M`` points west where A is the zenith, and east where A has the sign of gravity;
 ``N = W x A`` is north with either.
 
-What the tutorial leaves open
------------------------------
-Without a magnetometer the heading is that of the gyros.  (The tutorial's sample code then has a virtual one, "always
-pointing North": it pulls the nose to the north, whatever the aeroplane does, and is not for something that flies.)
-The weights count a sample: at another sample rate other weights are right.
-The tutorial starts at any heading and lets the magnetometer pull it round.  Here the first field sets it, as in every
-estimator of this project that has a magnetometer.
+Left open by the tutorial
+-------------------------
+Without a magnetometer the heading is that of the gyros.  (The tutorial's sample code has a virtual one, "always
+pointing North": it pulls the nose to the north, and is not meant for flight.)  The weights are per sample: another
+sample rate needs other weights.  The tutorial starts at any heading and lets the magnetometer correct it.  Here the
+first field sets it, as in every estimator of this project that has a magnetometer.
 
 References
 ----------
@@ -76,7 +75,7 @@ def axis(m, i):  # type: ignore[no-untyped-def]
 
 @kernel
 def trust(length_m_s2, band):  # type: ignore[no-untyped-def]
-    """Part of its weight that the accelerometer keeps: 1 at the length of gravity, 0 from `band` off it on."""
+    """Share of its weight that the accelerometer keeps: 1 at the length of gravity, 0 from `band` away on."""
     return max(0.0, 1.0 - abs(length_m_s2 / G_M_S2 - 1.0) / band)
 
 
@@ -86,7 +85,7 @@ def north(A, s):  # type: ignore[no-untyped-def]
     M = (s.field_b_ut[0], s.field_b_ut[1], s.field_b_ut[2])
     W = cross(A, M)
     horizontal2 = dot(W, W)
-    if not horizontal2 > SHORTEST_HORIZONTAL**2 * dot(M, M):  # a field of no length is none either
+    if not horizontal2 > SHORTEST_HORIZONTAL**2 * dot(M, M):  # nor a field of zero length
         return A, False
     N = cross(W, A)  # magnetic: true north lies to the west of it by the declination
     scale = 1.0 / np.sqrt(horizontal2)
@@ -96,10 +95,10 @@ def north(A, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def displacement(row, s, good, field_came):  # type: ignore[no-untyped-def]
-    """The weighted mean d theta of what the instruments felt (Part 4), in body axes."""
+    """The weighted mean d theta of the instruments (Part 4), in body axes."""
     I0, J0, K0 = axis(s.dcm, 0), axis(s.dcm, 1), axis(s.dcm, 2)
     w, dt = s.omega_b_rad_s, s.dt_s
-    # What is summed about I, J and K: the earth turns against the gyro (comment 37).
+    # Sums about I, J and K: the earth turns against the gyro (comment 37).
     g = (-dt * w[0], -dt * w[1], -dt * w[2])
     i, j, k = s.s_g * dot(g, I0), s.s_g * dot(g, J0), s.s_g * dot(g, K0)
     by_i = by_j = by_k = s.s_g
@@ -114,7 +113,7 @@ def displacement(row, s, good, field_came):  # type: ignore[no-untyped-def]
         if field_came:
             N, found = north(A, s)
             if found:
-                m, s_m = cross(I0, N), part * s.s_m  # it leans on A, and is trusted as far as A is
+                m, s_m = cross(I0, N), part * s.s_m  # it depends on A, and is trusted as far as A is
                 j, k = j + s_m * dot(m, J0), k + s_m * dot(m, K0)
                 by_j, by_k = by_j + s_m, by_k + s_m
     return plus(plus(plus(ZERO, i / by_i, I0), j / by_j, J0), k / by_k, K0)
@@ -132,7 +131,7 @@ def orthonormalise(a, b):  # type: ignore[no-untyped-def]
 
 @kernel
 def turn(dcm, d):  # type: ignore[no-untyped-def]
-    """Turn the matrix by the small rotation `d` of the earth, in place, as many small parts as it takes."""
+    """Turn the matrix by the rotation `d` of the earth, in place, in as many small parts as needed."""
     parts = 1
     if dot(d, d) > SMALL_RAD**2:
         parts = 1 + int(np.sqrt(dot(d, d)) / SMALL_RAD)
@@ -147,14 +146,14 @@ def turn(dcm, d):  # type: ignore[no-untyped-def]
 
 @kernel
 def to_north_east_down(s):  # type: ignore[no-untyped-def]
-    """Write the attitude that the rest of the world knows: east is not west, down is not up."""
+    """Write ``R_eb``, north-east-down, from ``dcm``, north-west-up."""
     for i in range(3):
         s.R_eb[0, i], s.R_eb[1, i], s.R_eb[2, i] = s.dcm[0, i], -s.dcm[1, i], -s.dcm[2, i]
 
 
 @kernel
 def align(s):  # type: ignore[no-untyped-def]
-    """Begin with the heading of the first field, the tilt as it is."""
+    """Set the heading from the first field; the tilt stays."""
     if turn_to_north(s.R_eb, s.field_b_ut, s.declination_rad):
         s.aligned = 1
         for i in range(3):
@@ -183,7 +182,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class Starlino(Compiled[StarlinoParams]):
-    """Starlino's weighted mean of small rotations, in both its forms; see the module.
+    """Starlino's complementary filter: weighted mean of small rotations, no centrifugal term.
 
     The first field sets the heading.  Started in the air it begins with the tutorial's unit matrix, which corrects
     itself (comment 112).

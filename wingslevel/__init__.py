@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from wingslevel._names import autopilots, estimators, parameters, scenarios
     from wingslevel._pages import export, view
     from wingslevel._replaying import Replay, replay
+    from wingslevel._reports import Report, agree, aircraft, bench, claims, sensors
     from wingslevel._results import CheckResult, Comparison
     from wingslevel.include import get_include
 
@@ -84,6 +85,7 @@ _HOMES = {
     "wingslevel._names": ("autopilots", "estimators", "parameters", "scenarios"),
     "wingslevel._pages": ("export", "view"),
     "wingslevel._replaying": ("Replay", "replay"),
+    "wingslevel._reports": ("Report", "agree", "aircraft", "bench", "claims", "sensors"),
     "wingslevel._results": ("CheckResult", "Comparison"),
     "wingslevel.include": ("get_include",),
 }  # fmt: skip
@@ -107,11 +109,16 @@ __all__ = [
     "MagSample",
     "Measurements",
     "Replay",
+    "Report",
     "WingslevelError",
     "WingslevelWarning",
     "__version__",
+    "agree",
+    "aircraft",
     "autopilots",
+    "bench",
     "check",
+    "claims",
     "compare",
     "estimate",
     "estimators",
@@ -122,6 +129,7 @@ __all__ = [
     "parameters",
     "replay",
     "scenarios",
+    "sensors",
     "view",
 ]
 

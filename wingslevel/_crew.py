@@ -65,12 +65,17 @@ def crew(workers: int | None, estimators: Mapping[str, Any]) -> int:
 @contextmanager
 def quietly() -> Iterator[list[str]]:
     """Print nothing inside the block: gives the notes, which are complete after it; warnings become Python's."""
+    from estimator.compiler import compiling
     from scenarios.harness.cli import console
     from scenarios.harness.cli.reports import losses
 
     notes: list[str] = []
     with one_line(), console.collected() as lines, losses():
-        yield notes
+        compiling.on_trouble(lambda line: lines.append(f"warning: kernel cache: {line}"))
+        try:
+            yield notes
+        finally:
+            compiling.on_trouble(None)
     for line in lines:
         start, warned, rest = line.partition("warning: ")
         if warned and not start:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from wingslevel._conditions import Conditions, Estimator, changes_of, plain, with_conditions
+from wingslevel._crew import quietly
 from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning, one_line
 from wingslevel._flight import Flight, rows_of
 from wingslevel._progress import Progress, progress_of
@@ -57,7 +58,7 @@ def fly(
     from sim.log import Outcome
 
     changes = changes_of(conditions, params)
-    with one_line(), _timed(timeout):
+    with quietly(), _timed(timeout):
         prepared = prepare(plain(scenario), changes, seed=plain(seed), estimator=plain(estimator))
         _warn_of_faults(prepared.config)
         with progress_of(progress, f"flying {prepared.scenario.name}", "s") as advance:

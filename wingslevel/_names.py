@@ -11,17 +11,17 @@ if TYPE_CHECKING:
 
 def scenarios() -> dict[str, str]:
     """Names of the scenarios, with a line about each; those that installed packages offer, too."""
-    return _listed("scenarios")
+    return listed("scenarios")
 
 
 def estimators() -> dict[str, str]:
     """Names of the estimators that need no path, with a line about each."""
-    return _listed("estimators")
+    return listed("estimators")
 
 
 def autopilots() -> dict[str, str]:
     """Names of the autopilots that need no path, with a line about each."""
-    return _listed("autopilots")
+    return listed("autopilots")
 
 
 def parameters(estimator: Estimator) -> "dict[str, Parameter]":
@@ -43,7 +43,7 @@ def parameters(estimator: Estimator) -> "dict[str, Parameter]":
         return {parameter.name: parameter for parameter in estimator_parameters(next(iter(found)))}
 
 
-def _listed(kind: str, names: Sequence[str] = ()) -> dict[str, str]:
+def listed(kind: str, names: Sequence[str] = ()) -> dict[str, str]:
     """Names of a kind, with a line about each; of one that is broken, why."""
     from scenarios.harness.commands.listing import listing
     from wingslevel._crew import quietly

@@ -4,7 +4,10 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from estimator.compiler.compiling import Progress as Kernels
 
 Advance = Callable[[float, float], None]  # called with what is done, and the total
 Progress = bool | Advance
@@ -22,10 +25,14 @@ def progress_of(wanted: Progress, what: str, unit: str) -> Iterator[Advance]:
     elif not wanted or not _is_watched():
         yield lambda _done, _total: None
     else:
+        from estimator.compiler import compiling
+
         bar = _Bar(what, unit)
+        before = compiling.on_compile(bar.compiling)
         try:
             yield bar
         finally:
+            compiling.on_compile(before)
             bar.close()
 
 
@@ -48,26 +55,32 @@ class _Bar:
         self._task: Any = None
 
     def __call__(self, done: float, total: float) -> None:
-        if self._bar is None:
-            if time.monotonic() - self._began_s < PATIENCE_S:
-                return
+        if self._is_shown():
+            self._bar.update(self._task, completed=done, total=total, what=self._what)
+
+    def compiling(self, kernels: "Kernels") -> None:
+        """Count the kernels that are compiled, which takes a minute or two the first time."""
+        if self._is_shown():
+            self._bar.update(self._task, what=f"compiling, once for this version: {kernels.compiled} kernels")
+
+    def _is_shown(self) -> bool:
+        if self._bar is None and time.monotonic() - self._began_s >= PATIENCE_S:
             self._show()
-        self._bar.update(self._task, completed=done, total=total)
+        return self._bar is not None
 
     def _show(self) -> None:
         from rich.console import Console
-        from rich.markup import escape
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
         self._bar = Progress(
-            TextColumn(escape(self._what)),
+            TextColumn("{task.fields[what]}", markup=False),
             BarColumn(),
             TextColumn(f"{{task.completed:.0f}}/{{task.total:.0f}} {self._unit}"),
             TimeElapsedColumn(),
             console=Console(stderr=not _in_notebook()),
             transient=True,
         )
-        self._task = self._bar.add_task("", total=1.0)
+        self._task = self._bar.add_task("", total=1.0, what=self._what)
         self._bar.start()
 
     def close(self) -> None:

@@ -1,26 +1,26 @@
-"""ArduPilot's AP_AHRS_DCM as it was on 12 July 2013, the algorithm that van Zundert et al. carried to Simulink.
+"""ArduPilot's AP_AHRS_DCM of 12 July 2013, the algorithm that van Zundert et al. ported to Simulink.
 
 One pass per inertial sample: integrate the gyros and renormalise (their chapter 2), correct yaw by compass or by
 the course over ground (3.1), and, at every GPS fix, correct all three axes by the mean specific force of the
-interval seen in the earth frame, against gravity and the change of GPS velocity (3.2; Premerlani's note of 2011).
-The proportional terms are held in between; the integral is taken over every five seconds of slow rotation.
+interval in the earth frame, against gravity and the change of GPS velocity (3.2; Premerlani's note of 2011).
+The proportional terms are held in between; the integral is updated after every five seconds of slow rotation.
 
 Quirks
 ------
-What the original did and a later version, or any reader, would mend, stands behind a name in `Quirk`.
-`JULY_2013` has them all and is the original; the empty set, the default, is the same algorithm mended.
+Faults of the original, corrected in later versions or obvious to a reader, each have a name in `Quirk`.
+`JULY_2013` is all of them, the original; the default is the empty set, the same algorithm corrected.
 
-The report's text departs from the code that it describes
----------------------------------------------------------
+Differences between the report's text and the code that it describes
+--------------------------------------------------------------------
 * The integral is not "set equal to" the saturated sum: the saturated sum is added to it, and cleared.
 * Eqn 3.12 integrates the error in the earth frame; the code integrates it in the body frame, as Eqn 3.11 has it.
-* The third element of the error (Eqn 3.9) is zeroed with a compass and without GPS only.
+* The third element of the error (Eqn 3.9) is zeroed only with a compass and without GPS.
 * Without GPS the correction comes once in 0.2 s, and the proportional term is held from one to the next.
 
-Left out: the trim of the board, the eightfold gains before arming, the position.  The rate that is told has no
-proportional terms in it: these turn the estimate, not the aeroplane.  Beyond the original: samples are screened as
-for every estimator here, steps of more than 0.2 rad are taken in parts, and power-up levels on the mean sample if
-it is given one; ``reset(None)`` is level and north, as in 2013.
+Left out: the trim of the board, the eightfold gains before arming, the position.  The reported rate has no
+proportional terms in it: they turn the estimate, not the aeroplane.  Beyond the original: samples are screened as
+in every estimator here, steps of more than 0.2 rad are taken in parts, and power-up levels on the mean sample if
+there is one; ``reset(None)`` is level and north, as in 2013.
 
 References
 ----------
@@ -36,7 +36,7 @@ import numpy as np
 from estimator.ap_dcm.wind import AIR_LIFE_S, learn_wind
 from estimator.ap_dcm.yaw import FIX_LIFE_S, MIN_SPEED_M_S, SPIN_LIMIT_RAD_S, correct_yaw, spin_gain
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
-from estimator.blocks.kernels import clip
+from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.magnetometer import FIELD, take_field
 from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen, take_rate
 from estimator.compiler.jit import kernel
@@ -44,7 +44,7 @@ from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
 from estimator.params.ap_dcm import AP_DCM_2013, MOST_FIXES, ApDcmParams, Quirk
 from estimator.rotation import LONGEST_STEP_RAD, level, propagate, renormalise_exactly
 
-LONGEST_PAUSE_S = 0.2  # after a longer one the interval begins anew, and its gyro sample is lost
+LONGEST_PAUSE_S = 0.2  # after a longer one the interval restarts, and its gyro sample is lost
 LEARN_S = 5.0 + 1e-5  # the integral moves once in so much slow rotation: 25 fixes of 0.2 s in float32 just miss it
 NO_GPS_S = 0.2 - 1e-5  # interval of correction without GPS: 20 samples of 10 ms just reach it
 LAUNCH_M_S2 = 7.0  # forward specific force of a throw
@@ -55,24 +55,24 @@ _STATE = (
     Column("use_magnetometer", (), "1 where its samples are taken", integer=True),
     Column("omega_p_b", (3,), "proportional roll-pitch correction, held between two of them, Eqn 3.11"),
     Column("omega_yaw_p", (), "proportional yaw correction, about body z, Eqn 3.4"),
-    Column("omega_i_b", (3,), "integral correction; minus the offset still found"),
-    Column("omega_sum_b", (3,), "what the integral will move by, Eqns 3.5 and 3.12"),
+    Column("omega_i_b", (3,), "integral correction; minus the offset learnt since"),
+    Column("omega_sum_b", (3,), "next change of the integral, Eqns 3.5 and 3.12"),
     Column("sum_s", (), "time of slow rotation in that sum"),
     Column("omega_total_b", (3,), "corrected rate that is integrated, Eqn 2.1"),
     Column("spin_rad_s", (), "length of the corrected rate without proportional terms"),
     Column("R_euler_eb", (3, 3), "attitude whose roll, pitch and yaw are used"),
     Column("error_b", (3,), "roll-pitch-yaw error of the specific force, body axes, Eqn 3.10"),
     Column("yaw_found", (), "1 once heading was set", integer=True),
-    Column("force_sum_e_m_s", (3,), "integral of the specific force seen from the earth, Eqn 3.7"),
+    Column("force_sum_e_m_s", (3,), "integral of the specific force in earth axes, Eqn 3.7"),
     Column("force_s", (), "time in that sum"),
     Column("interval_s", (), "time since the last correction"),
     Column("begun", (), "1 once a velocity begins the interval", integer=True),
     Column("lock", (), "1 if the interval began with a fix", integer=True),
-    Column("force_e_g", (3,), "mean specific force, seen from the earth"),
-    Column("reference_e", (3,), "what it should be in direction, Eqn 3.8 and the note's Eqn 3"),
-    Column("delayed", (MOST_FIXES, 3), "mean specific forces that wait for their velocity"),
+    Column("force_e_g", (3,), "mean specific force, earth axes"),
+    Column("reference_e", (3,), "its reference direction, Eqn 3.8 and the note's Eqn 3"),
+    Column("delayed", (MOST_FIXES, 3), "mean specific forces that await their velocity"),
     Column("oldest", (), "index of the oldest of them", integer=True),
-    Column("delay_begun", (), "1 once they are there", integer=True),
+    Column("delay_begun", (), "1 once they are filled", integer=True),
     Column("v_e_m_s", (3,), "velocity at the end of the interval"),
     Column("v_last_e_m_s", (3,), "velocity at its beginning"),
     Column("new_fix", (), "1 where a usable fix arrived in this tick", integer=True),
@@ -91,14 +91,14 @@ _STATE = (
     Column("course_yaw_s", (), "when the course last corrected yaw"),
     Column("nose_last", (3,), "nose at the last wind estimate"),
     Column("v_wind_e_m_s", (3,), "velocity at the last wind estimate"),
-    Column("wind_s", (), "when that was; before any, long ago"),
+    Column("wind_s", (), "time of that; -inf before the first"),
 )
 STATE_DTYPE = state_dtype(ApDcmParams, *FIELD, *_STATE)
 
 
 @kernel
 def take_arrivals(row, s):  # type: ignore[no-untyped-def]
-    """Take what arrived of GPS, magnetometer and airspeed, if it can be believed."""
+    """Take plausible samples of GPS, magnetometer and airspeed that arrived."""
     s.fix_age_s += s.dt_s
     s.field_age_s += s.dt_s
     s.air_age_s += s.dt_s
@@ -132,7 +132,7 @@ def turn(row, s, good):  # type: ignore[no-untyped-def]
         _copy(s.R_eb, s.R_euler_eb)
     angle_rad = s.dt_s * np.sqrt(total[0] * total[0] + total[1] * total[1] + total[2] * total[2])
     parts = 1
-    if angle_rad >= LONGEST_STEP_RAD:  # NaN is not: its one part finds the matrix lost
+    if angle_rad >= LONGEST_STEP_RAD:  # not NaN: with one part the matrix is then found lost
         parts += int(min(angle_rad / LONGEST_STEP_RAD, 1000.0))
     for _ in range(parts):
         propagate(s.R_eb, total, s.dt_s / parts)
@@ -145,7 +145,7 @@ def turn(row, s, good):  # type: ignore[no-untyped-def]
 
 @kernel
 def _begin_anew(s):  # type: ignore[no-untyped-def]
-    """Go back to the attitude of the sample before, or level, and forget all corrections: one of them spoilt it."""
+    """Restore the previous sample's attitude, or level, and clear all corrections: one of them was invalid."""
     _copy(s.R_euler_eb, s.R_eb)
     if not renormalise_exactly(s.R_eb):
         level(s.R_eb)
@@ -179,7 +179,7 @@ def end_of_interval(row, s):  # type: ignore[no-untyped-def]
     else:
         if s.interval_s < NO_GPS_S:
             return False
-        for i in range(3):  # how the nose turns is what remains to tell of the motion
+        for i in range(3):  # only the turn of the nose shows the motion then
             v[i] = s.R_eb[i, 0] * s.airspeed_m_s + wind[i]
         s.lock = 0
     if s.begun:
@@ -206,10 +206,8 @@ def compare_force(s):  # type: ignore[no-untyped-def]
         _normalise(force)
     if moving and s.gps_delay_fixes > 0:
         delay_force(s)
-    x = force[1] * reference[2] - force[2] * reference[1]  # Eqn 3.9
-    y = force[2] * reference[0] - force[0] * reference[2]
-    z = force[0] * reference[1] - force[1] * reference[0]
-    if s.compass:  # yaw is the compass's, except as far as a bank lets the acceleration tell it
+    x, y, z = cross(force, reference)  # Eqn 3.9
+    if s.compass:  # yaw comes from the compass, but for the share that a bank makes visible in the acceleration
         R = s.R_euler_eb
         known = s.fix_age_s <= FIX_LIFE_S and s.gps_gain == 1.0
         z *= abs(R[2, 1]) / max(np.hypot(R[2, 1], R[2, 2]), 1e-9) if known else 0.0
@@ -220,15 +218,13 @@ def compare_force(s):  # type: ignore[no-untyped-def]
 @kernel
 def _normalise(a):  # type: ignore[no-untyped-def]
     """Scale to unit length, in place; a vector without direction becomes zero."""
-    length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-    scale = 1.0 / length if length > 1e-9 else 0.0
-    for i in range(3):
-        a[i] *= scale
+    length = np.sqrt(dot(a, a))
+    put(a, 1.0 / length if length > 1e-9 else 0.0, a)
 
 
 @kernel
 def delay_force(s):  # type: ignore[no-untyped-def]
-    """Exchange ``s.force_e_g`` for the one of `gps_delay_fixes` intervals ago."""
+    """Replace ``s.force_e_g`` by that of `gps_delay_fixes` intervals ago."""
     for i in range(3):
         now = s.force_e_g[i]
         if not s.delay_begun:
@@ -242,7 +238,7 @@ def delay_force(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def sum_force(row, s, good):  # type: ignore[no-untyped-def]
-    """Add the sample to the mean specific force of the interval, seen from the earth (Eqns 3.6 and 3.7)."""
+    """Add the sample to the mean specific force of the interval, in earth axes (Eqns 3.6 and 3.7)."""
     f = row.force_b_m_s2
     s.interval_s += s.dt_s
     if good & FORCE_GOOD:
@@ -256,7 +252,7 @@ def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
     """At the end of an interval, correct by its mean specific force (Eqns 3.8-3.12)."""
     if not end_of_interval(row, s):
         return
-    if s.force_s > 0.5 * s.interval_s:  # else too little of the interval was felt
+    if s.force_s > 0.5 * s.interval_s:  # else too little of the interval was measured
         compare_force(s)
     else:
         s.error_b[0] = s.error_b[1] = s.error_b[2] = 0.0
@@ -291,7 +287,7 @@ def thrown(forward_m_s2, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def forget_interval(s):  # type: ignore[no-untyped-def]
-    """Begin a new interval of the mean specific force."""
+    """Start a new interval of the mean specific force."""
     s.interval_s = s.force_s = 0.0
     for i in range(3):
         s.force_sum_e_m_s[i] = 0.0
@@ -306,10 +302,10 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         take_arrivals(row, s)
         if s.dt_s > LONGEST_PAUSE_S:
             forget_interval(s)
-            s.lock = 0  # nor does the old velocity belong to the new interval
+            s.lock = 0  # the old velocity does not belong to the new interval
         else:
             turn(row, s, good)
-            sum_force(row, s, good)  # before a heading is set: the interval was felt in the frame of until now
+            sum_force(row, s, good)  # before a heading is set: the interval was measured in the previous frame
             correct_yaw(s)
             correct_by_force(row, s, good)
     return health_of(s, s.yaw_found, s.fix_age_s <= FIX_LIFE_S or s.compass)
@@ -322,7 +318,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class ApDcm(Compiled[ApDcmParams]):
-    """ArduPilot's DCM of July 2013, with its quirks corrected unless the parameters restore them; see the module."""
+    """ArduPilot's DCM of July 2013 with its known faults corrected."""
 
     heading_reference: HeadingReference = "course"  # "nose" where a magnetometer is known to be fitted
     uses = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")
@@ -344,6 +340,6 @@ class ApDcm(Compiled[ApDcmParams]):
 
 
 class ApDcm2013(ApDcm):
-    """The original of 12 July 2013: `ApDcm` with all quirks."""
+    """ArduPilot's DCM of 12 July 2013 as it was, with all its faults."""
 
     _default = AP_DCM_2013

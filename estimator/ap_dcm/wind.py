@@ -9,16 +9,16 @@ import numpy as np
 
 from estimator.compiler.jit import kernel
 
-AIR_LIFE_S = 1.0  # an older airspeed is none
+AIR_LIFE_S = 1.0  # an older airspeed is not used
 WIND_RESTART_S, WIND_STRAIGHT_S = 10.0, 2.0
-WIND_TURN, WIND_JUMP_M_S = 0.2, 20.0  # least change of the nose, and largest step believed
+WIND_TURN, WIND_JUMP_M_S = 0.2, 20.0  # smallest change of the nose, and largest accepted step
 
 
 @kernel
 def learn_wind(s):  # type: ignore[no-untyped-def]
-    """Learn the wind from the change of velocity that goes with a change of the nose, or straight from airspeed.
+    """Learn the wind from the change of velocity with a change of the nose, or directly from airspeed.
 
-    Through still air a turn takes the velocity V f to V f_last: V and the wind are what two such velocities share.
+    The velocity through the air is V times the nose f: two ground velocities with different noses give V and the wind.
     """
     v, f, v0, f0, wind = s.v_e_m_s, s.R_eb[:, 0], s.v_wind_e_m_s, s.nose_last, s.wind_e_m_s
     since_s = s.clock_s - s.wind_s
@@ -46,7 +46,7 @@ def learn_wind(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def remember_nose(s):  # type: ignore[no-untyped-def]
-    """Keep the nose and the velocity of now for the next wind estimate."""
+    """Keep the present nose and velocity for the next wind estimate."""
     s.wind_s = s.clock_s
     for i in range(3):
         s.nose_last[i] = s.R_eb[i, 0]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from estimator.blocks.kernels import clip, wrap
+from estimator.blocks.kernels import clip, dot, wrap
 from estimator.compiler.jit import kernel
 
 FIX_LIFE_S, FIELD_LIFE_S = 2.0, 0.5  # an older sample is not used
@@ -36,7 +36,7 @@ def set_heading(s, heading_rad):  # type: ignore[no-untyped-def]
 
 @kernel
 def judge_compass(s):  # type: ignore[no-untyped-def]
-    """Set ``s.compass``: not if far off a course that wind alone cannot explain."""
+    """Set ``s.compass``: 0 if it is further off the course than wind can explain."""
     off = False
     if s.fly_forward and s.fix_age_s <= FIX_LIFE_S and s.speed_m_s >= MIN_SPEED_M_S:
         w, x, y = s.wind_e_m_s, s.R_euler_eb[0, 0], s.R_euler_eb[1, 0]
@@ -50,10 +50,9 @@ def judge_compass(s):  # type: ignore[no-untyped-def]
 def compass_error(s):  # type: ignore[no-untyped-def]
     """Earth-frame yaw error of the magnetometer (Eqns 3.1 and 3.2); sets the heading the first time."""
     m = s.field_b_ut
-    north = s.R_eb[0, 0] * m[0] + s.R_eb[0, 1] * m[1] + s.R_eb[0, 2] * m[2]  # Eqn 3.1
-    east = s.R_eb[1, 0] * m[0] + s.R_eb[1, 1] * m[1] + s.R_eb[1, 2] * m[2]
+    north, east = dot(s.R_eb[0], m), dot(s.R_eb[1], m)  # Eqn 3.1
     length = np.sqrt(north * north + east * east)
-    if length < 1e-9:  # it points straight down: no direction
+    if length < 1e-9:  # vertical: no direction
         return 0.0
     if not s.yaw_found:
         set_heading(s, _yaw(s.R_eb) + s.declination_rad - np.arctan2(east, north))

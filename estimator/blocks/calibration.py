@@ -18,7 +18,7 @@ import numpy as np
 from estimator.interface import Array
 
 _LEAST_READINGS = 9  # an ellipsoid about a known centre has six unknowns
-_FLATTEST = 0.1  # the least ratio of two axes that is believed to be iron, not a sweep in one plane
+_FLATTEST = 0.1  # smallest ratio of two axes that is iron rather than a sweep in one plane
 
 Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
@@ -69,9 +69,9 @@ def _readings(field_b_ut: Array, least: int) -> Array:
 def hard_iron_from_extremes(field_b_ut: Array) -> Array:
     """Offset of every axis, half-way between its largest and its smallest reading (Dilshad & Jahan, Eqn 8).
 
-    Right where in the sweep every axis has pointed along the field and against it, or as near to the one as to the
-    other.  Where an axis has missed the two by the angles a and b, the answer is wrong by
-    |B| (cos a - cos b) / 2; noise of sigma s adds about half of s.
+    Correct if in the sweep every axis has pointed along the field and against it, or equally near to both.  If an axis
+    has missed the two by the angles a and b, the result is wrong by |B| (cos a - cos b) / 2; noise of sigma s adds
+    about half of s.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def hard_iron_from_extremes(field_b_ut: Array) -> Array:
 
     Returns
     -------
-    shape (3,)      what the magnetometer reads too much, to be taken off every reading
+    shape (3,)      to be subtracted from every reading
 
     Raises
     ------
@@ -93,7 +93,7 @@ def soft_iron_from_ellipsoid(field_b_ut: Array, hard_iron_b_ut: Array) -> Array:
     """The symmetric matrix that takes the ellipsoid of the readings to a sphere of the same volume.
 
     Least squares for Q in ``(x - h)^T Q (x - h) = 1``, linear in the six elements of the symmetric Q; the matrix is
-    then the square root of Q, scaled to determinant 1.  Great circles about three axes are enough of a sweep.
+    then the square root of Q, scaled to determinant 1.  Great circles about three axes are a sufficient sweep.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def soft_iron_from_ellipsoid(field_b_ut: Array, hard_iron_b_ut: Array) -> Array:
 
     Raises
     ------
-    ValueError      too few rows, or rows that lie on no ellipsoid: turned about one axis only, say
+    ValueError      too few rows, or rows that lie on no ellipsoid, as when turned about one axis only
     """
     x, y, z = (_readings(field_b_ut, _LEAST_READINGS) - np.asarray(hard_iron_b_ut, np.float64)).T
     scale = float(np.sqrt(np.mean(x * x + y * y + z * z)))

@@ -1,16 +1,14 @@
-"""A memory of the motion that every correction of the attitude turns with it.
+"""A memory of the motion in a frame to which later corrections of the attitude still apply.
 
-Frame ``g`` is the earth as the gyros alone have it: ``R_gb`` integrates the corrected rate and nothing else.
+Frame ``g`` is the earth frame by the gyros alone: ``R_gb`` integrates the corrected rate and nothing else.
 Proportional corrections go into ``R_eg``, and the attitude is ``R_eb = R_eg @ R_gb``: Eqns 16 and 17 of Premerlani and
 Bizard, with the proportional rate applied from the earth's side.
 
-What a late and filtered GPS velocity is to be compared with (what the accelerometer felt, where the nose pointed) is
-summed in ``g``, passes the receiver's filter there, and is recalled from one latency ago.  Multiplied by the
-``R_eg`` of now, the memory has all corrections in it that were made since: a lag of the receiver is then no lag in the
-feedback loop, whatever its gain.
+The counterpart of a late and filtered GPS velocity (integrated specific force, direction of the nose) is summed in
+``g``, passes the receiver's filter there, and is recalled from one latency ago.  Multiplied by the present ``R_eg`` it
+includes all corrections made since: the receiver's lag is then no lag in the feedback loop, whatever the gain.
 
-The state record has the columns of `compiled.BELIEF`, `screening.SCREEN` and `GYRO_FRAME`, and the parameters
-``gps_filter_s`` and ``gps_latency_s``.
+The state has the columns of `GYRO_FRAME`, and the parameters ``gps_filter_s`` and ``gps_latency_s``.
 """
 
 import math
@@ -22,20 +20,20 @@ from estimator.compiler.jit import inlined, kernel
 from estimator.interface import G_M_S2, Column
 from estimator.rotation import integrate, level, renormalise
 
-HISTORY, SPACING_S = 640, 0.0199  # remembered instants and their least distance: 12.7 s at any sample rate
-DUE_S = 0.05  # corrections, slow as they are, are applied in parts no shorter than this
-FLUSHED = 3.0  # after so many time constants the filter has forgotten
+HISTORY, SPACING_S = 640, 0.0199  # remembered instants and their spacing: 12.7 s at any sample rate
+DUE_S = 0.05  # corrections are slow: they are applied in steps no shorter than this
+FLUSHED = 3.0  # time constants after which the filter has forgotten
 
 GYRO_FRAME = (
-    Column("R_gb", (3, 3), "attitude as the gyros alone have it"),
+    Column("R_gb", (3, 3), "attitude by the gyros alone"),
     Column("R_eg", (3, 3), "product of all corrections"),
-    Column("R_og", (3, 3), "the same, turned about the vertical to the heading that is told"),
+    Column("R_og", (3, 3), "the same, turned about the vertical to the reported heading"),
     Column("yaw_applied_rad", (), "part of them about the vertical"),
-    Column("crab", (2,), "cosine and sine of the angle from the nose to the heading that is told"),
-    Column("tilt_rate_e", (3,), "rate of the roll-pitch correction under way"),
-    Column("tilt_left_s", (), "for how long still"),
-    Column("yaw_rate_e", (3,), "rate of the yaw correction under way"),
-    Column("yaw_left_s", (), "for how long still"),
+    Column("crab", (2,), "cosine and sine of the angle from the nose to the reported heading"),
+    Column("tilt_rate_e", (3,), "rate of the current roll-pitch correction"),
+    Column("tilt_left_s", (), "time left of it"),
+    Column("yaw_rate_e", (3,), "rate of the current yaw correction"),
+    Column("yaw_left_s", (), "time left of it"),
     Column("due_s", (), "time for which they have not been applied yet"),
     Column("felt_g_m_s", (3,), "integral of gravity minus acceleration"),
     Column("force_g_m_s2", (3,), "the last of its summands"),
@@ -44,21 +42,21 @@ GYRO_FRAME = (
     Column("before", (), "filter: weight of its last output"),
     Column("start", (), "filter: weight of the input at the start of the interval"),
     Column("end", (), "filter: weight of the input at the end of the interval"),
-    Column("history_t_s", (HISTORY,), "when each remembered `late_g` was"),
+    Column("history_t_s", (HISTORY,), "time of each remembered `late_g`"),
     Column("history", (HISTORY, 6), "remembered `late_g`"),
     Column("newest", (), "index of the newest of them", integer=True),
     Column("at_fix_g", (6,), "`late_g` of the last fix"),
-    Column("unfelt_s", (), "how long the accelerometer has been broken"),
-    Column("blind_until_s", (), "until then the sums have a hole in them"),
+    Column("unfelt_s", (), "time without a good accelerometer sample"),
+    Column("blind_until_s", (), "until then the sums lack a part"),
 )
 
 
 def start_gyro_frame(s: np.void) -> None:
-    """Set the columns of `GYRO_FRAME` in the zeroed record `s`: at rest in its attitude since long ago."""
+    """Set the columns of `GYRO_FRAME` in the zeroed record `s`: at rest in its attitude for all the past."""
     s["R_gb"] = s["R_eb"]
     s["R_eg"] = s["R_og"] = np.eye(3)
     s["crab"][0] = 1.0
-    s["late_g"][2] = -G_M_S2 * s["gps_filter_s"]  # a filtered integral of gravity is late by the time constant
+    s["late_g"][2] = -G_M_S2 * s["gps_filter_s"]  # a filtered integral of gravity lags by the time constant
     s["late_g"][3:] = s["R_eb"][:, 0]
     s["history"] = s["at_fix_g"] = s["late_g"]
     s["blind_until_s"] = -math.inf
@@ -78,13 +76,13 @@ def filter_weights(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def go_blind(s):  # type: ignore[no-untyped-def]
-    """Take note that the sums lack something that is in the reports to come."""
+    """Record that the sums lack a part that the coming reports contain."""
     s.blind_until_s = s.clock_s + s.gps_latency_s + FLUSHED * s.gps_filter_s
 
 
 @inlined
 def take_force(row, s, good):  # type: ignore[no-untyped-def]
-    """Set ``s.force_g_m_s2`` from the accelerometer; a broken sample is bridged with the last good one."""
+    """Set ``s.force_g_m_s2`` from the accelerometer; a rejected sample is replaced by the last good one."""
     if good & FORCE_GOOD:
         # Gravity minus acceleration is -f: the sign of Premerlani's accelerometer.  It is a mean over the interval:
         # half an interval before its end the body had not turned as far, A - (omega x A) dt / 2.
@@ -104,8 +102,8 @@ def take_force(row, s, good):  # type: ignore[no-untyped-def]
 def sum_up(row, s, good, gap_s):  # type: ignore[no-untyped-def]
     """Integrate gyros and accelerometer in ``g``, pass the sums through the receiver's filter, remember them.
 
-    good : of `screen`       gap_s : since the sample before, by the clock of the samples
-    Returns False where the attitude was lost.
+    good : from `screen`     gap_s : time since the previous sample, by the clock of the samples
+    Returns False if the attitude was lost.
     """
     R = s.R_gb
     nose0, nose1, nose2 = R[0, 0], R[1, 0], R[2, 0]
@@ -139,11 +137,11 @@ def sum_up(row, s, good, gap_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def recall(s, t_s):  # type: ignore[no-untyped-def]
-    """Set ``s.at_fix_g`` to `late_g` at `t_s`, between two remembered instants, or the oldest there is."""
+    """Set ``s.at_fix_g`` to `late_g` at `t_s`, interpolated between two remembered instants, or the oldest."""
     newer, part, t1, i = -1, 0.0, s.clock_s, s.newest  # -1: the present
     for _ in range(HISTORY):
         t0 = s.history_t_s[i]
-        if t0 > t1:  # came round to a newer one: the previous was the oldest
+        if t0 > t1:  # the ring has wrapped: the previous one was the oldest
             i = newer
             break
         if t0 <= t_s:
@@ -159,7 +157,7 @@ def recall(s, t_s):  # type: ignore[no-untyped-def]
 
 @inlined
 def to_earth(s, v_g):  # type: ignore[no-untyped-def]
-    """`v_g` of shape (3,) with all corrections up to now, as a tuple."""
+    """`v_g`, shape (3,), in earth axes with all corrections up to now, a tuple."""
     R, x, y, z = s.R_eg, v_g[0], v_g[1], v_g[2]
     return (
         R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
@@ -182,7 +180,7 @@ def turn_earth(R, x_rad, y_rad, z_rad):  # type: ignore[no-untyped-def]
 
 @kernel
 def apply_corrections(s):  # type: ignore[no-untyped-def]
-    """Apply what is due of the corrections under way; first thing at a report, which looks at the result."""
+    """Apply the part of the current corrections that is due; at a report, before the result is used."""
     tilt_s, yaw_s = min(s.tilt_left_s, s.due_s), min(s.yaw_left_s, s.due_s)
     s.due_s = 0.0
     if tilt_s > 0.0 or yaw_s > 0.0:

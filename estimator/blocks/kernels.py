@@ -36,3 +36,9 @@ def cross(a, b):  # type: ignore[no-untyped-def]
 def plus(a, factor, b):  # type: ignore[no-untyped-def]
     """``a + factor b`` of two vectors of three, a tuple."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
+
+
+@inlined
+def put(target, factor, a):  # type: ignore[no-untyped-def]
+    """Set `target`, shape (3,), to ``factor a``."""
+    target[0], target[1], target[2] = factor * a[0], factor * a[1], factor * a[2]

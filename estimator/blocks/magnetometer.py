@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.blocks.calibration import Calibration
+from estimator.blocks.kernels import dot
 from estimator.blocks.screening import MAG, refuse
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import Column
@@ -15,16 +16,16 @@ WEAKEST_UT = 1.0  # a weaker reading comes from a sensor that does not work
 SHORTEST_HORIZONTAL = 0.02  # sine of the angle between field and vertical below which there is no heading
 
 FIELD = (
-    Column("hard_iron_b_ut", (3,), "what every axis reads too much"),
+    Column("hard_iron_b_ut", (3,), "offset of each axis"),
     Column("soft_iron", (3, 3), "takes the ellipsoid of readings to a sphere"),
-    Column("field_range_ut", (), "a reading of an axis beyond this is no measurement"),
-    Column("field_b_ut", (3,), "the last sample believed, corrected"),
+    Column("field_range_ut", (), "a reading of an axis beyond this is rejected"),
+    Column("field_b_ut", (3,), "the last accepted sample, corrected"),
 )
 """Columns of the state of an estimator that calls `take_field`."""
 
 
 def write_calibration(state: NDArray[Any], calibration: Calibration) -> None:
-    """Put a calibration into the columns FIELD of a state record, shape (1,)."""
+    """Write a calibration into the columns FIELD of a state record, shape (1,)."""
     for f in fields(calibration):
         state[f.name][0] = getattr(calibration, f.name)
 
@@ -38,7 +39,7 @@ def believable(m, limit_ut):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_field(row, s):  # type: ignore[no-untyped-def]
-    """Whether a sample arrived in `row` that can be believed; corrected, it is then in ``s.field_b_ut``."""
+    """Whether a plausible sample arrived in `row`; corrected, it is then in ``s.field_b_ut``."""
     if not row.mag_new:
         return False
     m = row.mag_b_ut
@@ -53,10 +54,9 @@ def take_field(row, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def turn_to_north(R_eb, m, declination_rad):  # type: ignore[no-untyped-def]
-    """Turn the attitude about the vertical until the field `m` points to magnetic north: the heading to start with.
+    """Turn the attitude about the vertical until the field `m` points to magnetic north: the initial heading.
 
-    The tilt stays: where it is wrong by the angle a, the heading is wrong by up to about a times the tangent of the
-    field's dip.
+    The tilt stays: if it is wrong by the angle a, the heading is wrong by up to about a times the tangent of the dip.
 
     Parameters
     ----------
@@ -66,12 +66,11 @@ def turn_to_north(R_eb, m, declination_rad):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    bool    False, with nothing changed, where the field is vertical by this attitude, and tells no heading
+    bool    False, with nothing changed, if the field is vertical by this attitude and gives no heading
     """
-    north = R_eb[0, 0] * m[0] + R_eb[0, 1] * m[1] + R_eb[0, 2] * m[2]
-    east = R_eb[1, 0] * m[0] + R_eb[1, 1] * m[1] + R_eb[1, 2] * m[2]
+    north, east = dot(R_eb[0], m), dot(R_eb[1], m)
     horizontal = np.hypot(north, east)
-    if not horizontal > SHORTEST_HORIZONTAL * np.sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]):
+    if not horizontal > SHORTEST_HORIZONTAL * np.sqrt(dot(m, m)):
         return False
     by_rad = declination_rad - np.arctan2(east, north)
     c, z = np.cos(by_rad), np.sin(by_rad)

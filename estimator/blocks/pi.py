@@ -1,7 +1,6 @@
 """The weighted proportional-plus-integral drift controller, Eqns 28 and 29 of the paper.
 
-Linearised about a small attitude error e (axis by axis, the other reference silent) with an uncorrected gyro
-offset b, the loop is
+Linearised about a small attitude error e (one axis, one reference) with an uncorrected gyro offset b, the loop is
 
     de/dt = b - K_P W e + w_I,    dw_I/dt = -K_I W e    so    s^2 + K_P W s + K_I W = 0
 
@@ -44,7 +43,7 @@ def feed_back(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_p_b, omega_i_b)
     ----------
     total_b : shape (3,)             weighted correction, Eqn 28
     k_p, k_i : float                 gains, 1/s and 1/s^2 per unit of correction
-    offset_limit_rad_s : float       largest gyro offset that is believed, per axis
+    offset_limit_rad_s : float       largest gyro offset that is learnt, per axis
     omega_p_b, omega_i_b : shape (3,)  rate corrections, written
     """
     correct(total_b, k_p, omega_p_b)
@@ -62,9 +61,9 @@ def correct(total_b, k_p, omega_p_b):  # type: ignore[no-untyped-def]
 def learn_offset(total_b, k_p, k_i, offset_limit_rad_s, dt_s, omega_i_b):  # type: ignore[no-untyped-def]
     """Update the integral rate correction, in place (Eqn 29, second line).
 
-    In the steady state the proportional correction holds at most the offset that is still to be learnt.  A
-    correction larger than any believable offset is therefore something else (yaw lock, a turn in wind, a throw):
-    the integral sees no more of it than such an offset would cause.  This is all the anti-wind-up there is.
+    In the steady state the proportional correction equals at most the offset still to be learnt.  A correction larger
+    than the limit therefore has another cause (yaw lock, a turn in wind, a throw): the integral sees no more of it than
+    such an offset would cause.  There is no other anti-wind-up.
     """
     step_s = k_i * dt_s
     squared = k_p * k_p * (total_b[0] * total_b[0] + total_b[1] * total_b[1] + total_b[2] * total_b[2])

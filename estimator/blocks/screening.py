@@ -1,6 +1,6 @@
-"""Which samples are believed: every estimator meets NaN, spikes, repeated and lost samples in the same way.
+"""Screening of samples: every estimator handles NaN, spikes, repeated and lost samples in the same way.
 
-The state record of an estimator that uses this has the columns of `SCREEN` and of `compiled.BELIEF`.
+The state of an estimator has the columns of `SCREEN` and of `compiled.BELIEF`.
 """
 
 import math
@@ -13,44 +13,44 @@ from estimator.compiler.jit import inlined
 from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Array, Column, ImuSample
 from estimator.rotation import from_euler
 
-SHORTEST_INTERVAL_S = 1e-6  # no gyro samples faster, and what is divided by an interval stays finite
-LONGEST_GAP_S = 0.5  # a longer silence says nothing of the attitude: the estimate goes on from where it was
-CLOCK_BACK_S = 1.0  # a time this far back is no late sample but a clock that was set
-COAST_S = 0.25  # how long the last good rate stands in for a broken gyro
-# Mean samples further off are not of something at rest; parts are sold with offsets of up to +-40 deg/s.
+SHORTEST_INTERVAL_S = 1e-6  # no gyro samples faster; quotients by an interval stay finite
+LONGEST_GAP_S = 0.5  # after a longer gap the attitude is unknown: the estimate continues from where it was
+CLOCK_BACK_S = 1.0  # a time this far back means that the clock was set
+COAST_S = 0.25  # how long the last good rate replaces rejected ones
+# Beyond these a mean sample is not at rest; gyros are sold with offsets of up to +-40 deg/s.
 AT_REST_RAD_S, AT_REST_G = math.radians(45.0), 0.2
 AIRSPEED_RANGE_M_S = 1000.0
 
-PASSED, GYRO_GOOD, FORCE_GOOD = 1, 2, 4  # bits of what `screen` answers: time passed, and what to believe
+PASSED, GYRO_GOOD, FORCE_GOOD = 1, 2, 4  # bits that `screen` returns: time has passed, gyro and accelerometer are good
 ALL_GOOD = 7
 
 REFUSED = ("time", "gyro", "accelerometer", "gps", "magnetometer", "airspeed")
-"""What a sample that is not believed is counted under, in the column `refused`."""
+"""Names under which rejected samples are counted, in the column `refused`."""
 TIME, GYRO, FORCE, GPS, MAG, AIR = range(len(REFUSED))
 
 SCREEN = (
-    Column("gyro_range_rad_s", (), "a rate beyond this is no measurement"),
-    Column("force_range_m_s2", (), "a specific force beyond this is no measurement"),
+    Column("gyro_range_rad_s", (), "a rate beyond this is rejected"),
+    Column("force_range_m_s2", (), "a specific force beyond this is rejected"),
     Column("started", (), "1 once a sample was accepted", integer=True),
     Column("t_s", (), "time of the last accepted sample, by the clock of the samples"),
-    Column("clock_s", (), "time lived through; never runs back"),
-    Column("dt_s", (), "time that this tick accounts for"),
-    Column("bad_s", (), "how long the gyro has been broken"),
-    Column("rejected", (), "ticks in which something was not believed", integer=True),
-    Column("spoilt", (), "1 where this tick is counted among them already", integer=True),
-    Column("refused", (len(REFUSED),), "samples not believed, by what they are of: see REFUSED", integer=True),
+    Column("clock_s", (), "elapsed time; never runs back"),
+    Column("dt_s", (), "time that this tick covers"),
+    Column("bad_s", (), "time without a good gyro sample"),
+    Column("rejected", (), "ticks in which something was rejected", integer=True),
+    Column("spoilt", (), "1 if this tick is already counted there", integer=True),
+    Column("refused", (len(REFUSED),), "rejected samples by instrument, see REFUSED", integer=True),
 )
 
 
 @inlined
 def _within(a, limit):  # type: ignore[no-untyped-def]
     """Whether all three components are within +-limit; NaN is not."""
-    return (abs(a[0]) <= limit) & (abs(a[1]) <= limit) & (abs(a[2]) <= limit)  # cheaper than to stop early
+    return (abs(a[0]) <= limit) & (abs(a[1]) <= limit) & (abs(a[2]) <= limit)  # cheaper than short-circuiting
 
 
 @inlined
 def _interval_s(row, s):  # type: ignore[no-untyped-def]
-    """How much time this sample accounts for; 0 where its time or interval cannot be."""
+    """Time that this sample covers; 0 if its time or interval is impossible."""
     t, dt = row.t_s, row.dt_s
     if not (np.isfinite(t) and SHORTEST_INTERVAL_S <= dt <= LONGEST_GAP_S):
         return 0.0
@@ -61,7 +61,7 @@ def _interval_s(row, s):  # type: ignore[no-untyped-def]
         if gap <= 0.0:
             return 0.0
         if 1.5 * dt < gap <= LONGEST_GAP_S:
-            dt = gap  # samples were lost: this one stands for them
+            dt = gap  # samples were lost: this one covers them
     s.started = 1
     s.t_s = t
     return dt
@@ -69,7 +69,7 @@ def _interval_s(row, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def refuse(s, what):  # type: ignore[no-untyped-def]
-    """Count a sample of the instrument `what` (an index of REFUSED) that is not believed, and the tick once."""
+    """Count a rejected sample of the instrument `what` (an index of REFUSED), and the tick once."""
     s.refused[what] += 1
     if not s.spoilt:
         s.spoilt = 1
@@ -78,11 +78,11 @@ def refuse(s, what):  # type: ignore[no-untyped-def]
 
 @inlined
 def screen_gyro(row, s):  # type: ignore[no-untyped-def]
-    """Judge the time and the gyro of `row`, set ``s.dt_s``, count a rejection: for what uses no accelerometer.
+    """Check the time and the gyro of `row`, set ``s.dt_s``, count a rejection: without the accelerometer.
 
     Returns
     -------
-    int    0 where no time has passed, else PASSED with GYRO_GOOD where it is
+    int    0 if no time has passed, else PASSED, with GYRO_GOOD if so
     """
     s.spoilt = 0
     s.dt_s = _interval_s(row, s)
@@ -100,11 +100,11 @@ def screen_gyro(row, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def screen(row, s):  # type: ignore[no-untyped-def]
-    """Judge the inertial sample of `row`, set ``s.dt_s``, count a rejection.
+    """Check the inertial sample of `row`, set ``s.dt_s``, count a rejection.
 
     Returns
     -------
-    int    0 where no time has passed, else PASSED with GYRO_GOOD and FORCE_GOOD as far as they are
+    int    0 if no time has passed, else PASSED, with GYRO_GOOD and FORCE_GOOD if so
     """
     good = screen_gyro(row, s)
     if good:
@@ -117,9 +117,9 @@ def screen(row, s):  # type: ignore[no-untyped-def]
 
 @inlined
 def airspeed_came(row, s):  # type: ignore[no-untyped-def]
-    """Whether an airspeed that can be believed arrived in `row`; it may be below zero, as a pitot tube at rest reads.
+    """Whether a plausible airspeed arrived in `row`; it may be below zero, as a pitot tube at rest reads.
 
-    NaN is refused only after a first airspeed: before that it says that no pitot tube is fitted, or none has reported.
+    NaN is rejected only after a first airspeed: before, it means that no pitot tube is fitted or none has reported.
     Needs ``s.air_age_s``, infinite before the first.
     """
     if not row.air_new:
@@ -143,7 +143,7 @@ def health_of(s, found, referenced):  # type: ignore[no-untyped-def]
 
 @inlined
 def take_rate(row, s, good):  # type: ignore[no-untyped-def]
-    """Set ``s.omega_b_rad_s``: gyro less believed bias; the last one where the gyro broke, zero if that lasts."""
+    """Set ``s.omega_b_rad_s``: gyro less estimated bias; the last one if the sample is rejected, zero if that lasts."""
     for i in range(3):
         if good & GYRO_GOOD:
             s.omega_b_rad_s[i] = row.gyro_b_rad_s[i] - s.gyro_bias_b_rad_s[i]
@@ -152,19 +152,19 @@ def take_rate(row, s, good):  # type: ignore[no-untyped-def]
 
 
 def refusals(state: NDArray[Any]) -> dict[str, int]:
-    """Samples not believed, by the instrument that they are of, from a state record of shape (1,)."""
+    """Rejected samples by instrument, from a state record of shape (1,)."""
     return {name: int(n) for name, n in zip(REFUSED, state["refused"][0], strict=True) if n}
 
 
 def offset_at_rest(sample: ImuSample) -> Array:
-    """Gyro offset from the mean sample of something standing or held, shape (3,), rad/s; zero if it is not that."""
+    """Gyro offset from a mean sample at rest, shape (3,), rad/s; zero if it is not at rest."""
     offset = np.array(sample.gyro_b_rad_s, np.float64)
     return offset if np.all(np.abs(offset) < AT_REST_RAD_S) else np.zeros(3)
 
 
 def attitude_at_rest(sample: ImuSample) -> Array:
-    """Tilt from the mean sample of something standing or held, heading north, shape (3, 3); level if it is not that."""
-    x, y, z = (-float(f) for f in sample.force_b_m_s2)  # the pull of gravity, seen from the body
+    """Tilt from a mean sample at rest, heading north, shape (3, 3); level if it is not at rest."""
+    x, y, z = (-float(f) for f in sample.force_b_m_s2)  # gravity in body axes
     if not abs(math.hypot(x, y, z) / G_M_S2 - 1.0) < AT_REST_G:
         return np.eye(3)
     return from_euler(math.atan2(y, z), math.atan2(-x, math.hypot(y, z)), 0.0)

@@ -1,18 +1,17 @@
-"""The wind, learnt from how the ground velocity changes while the nose turns.
+"""The wind, learnt from the change of ground velocity while the nose turns.
 
-Horizontally, with north + i east as one complex number, an aeroplane that flies where its nose points has
+Horizontally, with north + i east as one complex number, an aeroplane without sideslip has
 
     v = w + c f
 
-``v`` the ground velocity, ``w`` the wind, ``f`` the nose as the gyros see it, whose heading may be off by any
-constant angle, and ``c`` the airspeed, turned by that angle.  Straight ahead the two terms cannot be told apart;
-in a turn ``f`` moves and ``w`` does not.  From two fixes alone, c = dv / df and w = v - c f: that is the wind
-estimate of MatrixPilot and ArduPilot, which takes |dv| / |df| for the airspeed and turns the nose by the angle from
-df to dv.  Here every fix counts, by as much as it tells: a Kalman filter with the two complex states w and c, whose
-covariance says how well the wind is known.
+``v`` the ground velocity, ``w`` the wind, ``f`` the nose by the gyros, whose heading may be off by any constant angle,
+and ``c`` the airspeed, turned by that angle.  In straight flight the two terms cannot be separated; in a turn ``f``
+moves and ``w`` does not.  From two fixes alone, c = dv / df and w = v - c f: that is the wind estimate of MatrixPilot
+and ArduPilot, which takes |dv| / |df| for the airspeed and turns the nose by the angle from df to dv.  Here every fix
+counts by its information: a Kalman filter with the two complex states w and c, whose covariance is that of the wind.
 
-Two things the caller owes.  ``f`` has passed the receiver's own filter and latency, as ``v`` has.  And ``f`` is free
-of yaw corrections: a nose that was pulled towards the course would find no wind.  No airspeed is needed.
+The caller passes an ``f`` that has the receiver's filter and latency, as ``v`` has, and no yaw corrections: a nose that
+is corrected towards the course would show no wind.  No airspeed is needed.
 
 References
 ----------
@@ -22,14 +21,14 @@ W. Premerlani, "IMU wind estimation (theory)", 2009 (the two-fix form).
 from estimator.compiler.jit import kernel
 from estimator.interface import Column
 
-WIND_BEFORE_M_S = 4.0  # wind per axis that is expected before anything is known of it
-AIRSPEED_BEFORE_M_S = 30.0  # size of c, likewise
-WIND_WALK = 0.06  # how quickly the wind changes, m/s per root second
-AIRSPEED_WALK = 0.6  # how quickly airspeed, and its direction against the gyros' nose, do
-RESIDUAL_M_S = 1.0  # sideslip, angle of attack, gusts: what one second of fixes is off by
-SURPRISE = 16.0  # squared innovation over its variance beyond which a fix is not believed
+WIND_BEFORE_M_S = 4.0  # sigma of the wind per axis, initially
+AIRSPEED_BEFORE_M_S = 30.0  # size of c, initially
+WIND_WALK = 0.06  # random walk of the wind, m/s per root second
+AIRSPEED_WALK = 0.6  # the same of airspeed and of its direction against the gyros' nose
+RESIDUAL_M_S = 1.0  # sigma of one second of fixes, from sideslip, angle of attack and gusts
+SURPRISE = 16.0  # squared innovation over its variance beyond which a fix is rejected
 KNOWN_M_S = 0.9  # the wind is known once its standard deviation is below
-FORGET_S = 4.0  # how long surprises must go on until the airspeed is learnt anew
+FORGET_S = 4.0  # duration of rejections after which the airspeed is learnt again
 SHORTEST_NOSE = 0.5  # a filtered nose shorter than this was in a loop or a spin
 
 WIND_FILTER = (
@@ -42,7 +41,7 @@ WIND_FILTER = (
 
 @kernel
 def learn_wind(s, nose_north, nose_east, v_north_m_s, v_east_m_s, dt_s):  # type: ignore[no-untyped-def]
-    """Take one GPS velocity into the belief of wind and airspeed; call it at fixes in flight.
+    """Update wind and airspeed with one GPS velocity; call it at fixes in flight.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ def learn_wind(s, nose_north, nose_east, v_north_m_s, v_east_m_s, dt_s):  # type
 
     Returns
     -------
-    bool    whether the fix was believed
+    bool    whether the fix was accepted
     """
     f = complex(nose_north, nose_east)
     w, c = complex(s.wind_e_m_s[0], s.wind_e_m_s[1]), complex(s.air_m_s[0], s.air_m_s[1])
@@ -65,15 +64,15 @@ def learn_wind(s, nose_north, nose_east, v_north_m_s, v_east_m_s, dt_s):  # type
     cc = min(cc + AIRSPEED_WALK**2 * dt_s, AIRSPEED_BEFORE_M_S**2)
 
     e = complex(v_north_m_s, v_east_m_s) - w - c * f
-    # What gusts and sideslip do to one fix they do to its neighbours: fixes of a second count as one.
+    # Gusts and sideslip affect neighbouring fixes alike: the fixes of one second count as one.
     residual = RESIDUAL_M_S**2 / min(max(dt_s, 1e-3), 1.0)
     w_e, c_e = ww + wc * f.conjugate(), wc.conjugate() + cc * f.conjugate()  # covariances with e
     variance = (w_e + c_e * f).real + residual
     clear = abs(f) >= SHORTEST_NOSE
-    believed = clear and abs(e) ** 2 <= SURPRISE * variance
-    if clear and not believed:  # if this goes on, airspeed or the gyros' heading are no longer what they were
+    accepted = clear and abs(e) ** 2 <= SURPRISE * variance
+    if clear and not accepted:  # if this persists, airspeed or the gyros' heading have changed
         cc = min(cc + abs(e) ** 2 * min(dt_s / FORGET_S, 1.0), AIRSPEED_BEFORE_M_S**2)
-    if believed:
+    if accepted:
         w, c = w + w_e * e / variance, c + c_e * e / variance
         ww -= abs(w_e) ** 2 / variance
         cc -= abs(c_e) ** 2 / variance
@@ -83,4 +82,4 @@ def learn_wind(s, nose_north, nose_east, v_north_m_s, v_east_m_s, dt_s):  # type
     s.wind_variance, s.air_variance = max(ww, 1e-6), max(cc, 1e-6)
     s.wind_air_covariance[0], s.wind_air_covariance[1] = wc.real, wc.imag
     s.wind_known = 1 if s.wind_variance < KNOWN_M_S**2 else 0
-    return believed
+    return accepted

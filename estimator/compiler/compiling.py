@@ -1,11 +1,9 @@
-"""What goes on while kernels are compiled, for those who show it and for those who handle Ctrl-C.
+"""Progress of kernel compilation, for displays and for the handling of Ctrl-C; does not import the compiler.
 
-The first call of a kernel compiles it, somewhere inside whatever command comes first, for half a minute in all.
-Nothing here imports the compiler.
+The first call of a kernel compiles it, in whatever command comes first; all of them take half a minute.
 
-The compiler calls back from C, where an exception of a signal handler is printed and lost.  So a handler asks `busy`,
-and where that is true raises nothing: it is asked again, by the function handed to `on_pause`, at the next place
-where an exception goes through.
+The compiler calls back from C, where an exception raised by a signal handler is printed and lost.  So a handler checks
+`busy` and raises nothing while that is true; the function given to `on_pause` can raise it at the next safe place.
 """
 
 import sys
@@ -18,9 +16,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far the compiler is in this process.
+    """Progress of the compiler in this process.
 
-    compiled : kernels so far     active : whether it goes on compiling     name : of the kernel that begins or ends
+    compiled : kernels so far     active : whether it is still compiling     name : of the kernel that starts or ends
     """
 
     compiled: int
@@ -29,7 +27,7 @@ class Progress:
 
 
 Watch = Callable[[Progress], None]
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 def _to_stderr(trouble: str) -> None:
@@ -37,13 +35,13 @@ def _to_stderr(trouble: str) -> None:
 
 
 class _State:
-    """Of this process."""
+    """State of this process."""
 
     watch: Watch | None = None
-    tell: Tell = staticmethod(_to_stderr)
+    report: Report = staticmethod(_to_stderr)
     pause: Callable[[], None] | None = None
     compiled = 0
-    told = False
+    reported = False
     spent_s = 0.0  # in the compiler, by all threads
 
 
@@ -52,31 +50,31 @@ _thread = threading.local()
 
 
 def on_compile(watch: Watch | None) -> Watch | None:
-    """Call `watch` when a kernel begins to be compiled and when it has been; returns who was called before.
+    """Call `watch` at the start and the end of each compilation; returns the previous function.
 
-    Nobody is called for a kernel that is loaded from the cache.  A worker process begins with nobody.
+    It is not called for a kernel loaded from the cache.  A worker process starts without one.
     """
     before, _state.watch = _state.watch, watch
     return before
 
 
-def on_trouble(tell: Tell | None) -> None:
-    """Give `tell` the line about a cache that cannot be used, once in a process; None is standard error."""
-    _state.tell, _state.told = tell or _to_stderr, False
+def on_trouble(report: Report | None) -> None:
+    """Pass the message about an unusable cache to `report`, once per process; None is standard error."""
+    _state.report, _state.reported = report or _to_stderr, False
 
 
 def on_pause(check: Callable[[], None]) -> None:
-    """Call `check` wherever an exception may be raised while compiling."""
+    """Call `check` at every place where an exception may be raised while compiling."""
     _state.pause = check
 
 
 def compiled() -> int:
-    """Kernels that this process has compiled so far."""
+    """Number of kernels that this process has compiled."""
     return _state.compiled
 
 
 def busy() -> bool:
-    """Whether this thread is inside the compiler, or loads what that has made."""
+    """Whether this thread is compiling a kernel or loading one."""
     return getattr(_thread, "depth", 0) > 0
 
 
@@ -91,14 +89,14 @@ def held() -> Iterator[None]:
 
 
 def enter() -> None:
-    """This thread goes into the compiler, or one step deeper."""
+    """This thread enters the compiler, or goes one level deeper."""
     _thread.depth = getattr(_thread, "depth", 0) + 1
     if _thread.depth == 1:
         _thread.since_s = time.monotonic()
 
 
 def leave() -> None:
-    """This thread comes out of the compiler, or one step up."""
+    """This thread leaves the compiler, or goes one level up."""
     _thread.depth -= 1
     if _thread.depth == 0:
         _state.spent_s += time.monotonic() - _thread.since_s
@@ -106,7 +104,7 @@ def leave() -> None:
 
 
 def spent_s() -> float:
-    """Time that this process has spent compiling, and loading kernels, until now."""
+    """Time in seconds that this process has spent compiling and loading kernels."""
     return _state.spent_s + (time.monotonic() - _thread.since_s if busy() else 0.0)
 
 
@@ -117,12 +115,12 @@ def pause() -> None:
 
 
 def begins(name: str) -> None:
-    """A kernel begins to be compiled."""
+    """Compilation of a kernel starts."""
     _call(Progress(_state.compiled, True, name))
 
 
 def ends(name: str) -> None:
-    """A kernel has been compiled, or could not be."""
+    """Compilation of a kernel has ended, or failed."""
     _state.compiled += 1
     _call(Progress(_state.compiled, _thread.depth > 1, name))
 
@@ -133,7 +131,7 @@ def _call(progress: Progress) -> None:
 
 
 def trouble(line: str) -> None:
-    """Tell of a cache that cannot be used: the first time, in this process."""
-    if not _state.told:
-        _state.told = True
-        _state.tell(line)
+    """Report an unusable cache, once per process."""
+    if not _state.reported:
+        _state.reported = True
+        _state.report(line)

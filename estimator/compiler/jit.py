@@ -1,7 +1,7 @@
 """The decorator of every compiled kernel.
 
-numba keys its cache by the file of the function alone: a kernel whose *callee* in another file was edited would be
-loaded stale.  Ours is keyed by all sources that a kernel's module imports, see `kernel_cache`.
+numba keys its cache by the file of the function alone: after an edit of a *callee* in another file it would load a
+stale kernel.  Ours is keyed by all sources that a kernel's module imports, see `kernel_cache`.
 """
 
 from collections.abc import Callable
@@ -17,14 +17,13 @@ from estimator.compiler.kernel_cache import KernelCache, cache_of
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` to machine code on first call, cached on disk; division by zero gives inf, not an error.
 
-    Used as a plain decorator.  A kernel of the loop takes few, array-typed arguments and
-    allocates nothing.
+    A kernel of the loop takes few, array-typed arguments and allocates nothing.
     """
     return _compile(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """A `kernel` that always becomes part of its caller: for the steps of an algorithm that runs at every tick.
+    """A `kernel` that is always inlined into its caller: for the steps of an algorithm that runs at every tick.
 
     Inside one function the compiler keeps the state in registers; a call makes it write and read all of it.
     """
@@ -34,13 +33,13 @@ def inlined(function: Callable[..., Any]) -> Any:
 def _compile(function: Callable[..., Any], **options: Any) -> Any:
     compiled = numba.njit(error_model="numpy", **options)(function)
     cache = cache_of(function)
-    if cache is not None:  # a function typed at a prompt has no source that could be watched
+    if cache is not None:  # a function typed at a prompt has no source file
         compiled._cache = cache
     return compiled
 
 
 class _Compiles(event.Listener):  # type: ignore[misc]
-    """Hears when the compiler begins and ends; it does not begin where a kernel is loaded from the cache."""
+    """Reports the start and end of each compilation; loading a kernel from the cache is none."""
 
     def on_start(self, event: Any) -> None:
         compiling.enter()
@@ -54,9 +53,9 @@ class _Compiles(event.Listener):  # type: ignore[misc]
 
 
 class _Passes(event.Listener):  # type: ignore[misc]
-    """Hears when the compiler goes from one step to the next, where it can be interrupted."""
+    """Called between the passes of the compiler, where it can be interrupted."""
 
-    def on_start(self, event: Any) -> None:  # noqa: ARG002 - as the compiler calls it
+    def on_start(self, event: Any) -> None:  # noqa: ARG002 - the compiler's signature
         compiling.pause()
 
     def on_end(self, event: Any) -> None:
@@ -64,7 +63,7 @@ class _Passes(event.Listener):  # type: ignore[misc]
 
 
 def _name(event: Any) -> str:
-    """The kernel that is compiled; empty for a function of others, which is part of one."""
+    """Name of the kernel that is compiled; empty for a library function that is part of one."""
     dispatcher = event.data["dispatcher"]
     is_ours = isinstance(getattr(dispatcher, "_cache", None), KernelCache)
     return dispatcher.py_func.__qualname__ if is_ours else ""

@@ -1,11 +1,10 @@
-"""Compiled kernels on disk: what numba keeps of a function, where it belongs, whole or not at all.
+"""The cache of compiled kernels on disk.
 
-Every module with kernels has a folder, named by the module and by a hash over all sources on which its kernels depend
-(`estimator.compiler.sources`): an edit compiles anew what can have changed, and nothing else.
+Every module with kernels has a folder, named by the module and by a hash of all sources on which its kernels depend
+(`estimator.compiler.sources`): after an edit only the kernels that can have changed are compiled again.
 
-A cache is never a reason to fail.  Every file carries its checksum; one that is damaged is thrown away and its kernel
-compiled again.  Where nothing can be written, because the disk is full or the folder is not ours, kernels are compiled
-in memory.  Both print one line.
+The cache never causes a failure.  Every file has a checksum; a damaged one is discarded and its kernel compiled again.
+If nothing can be written (disk full, no permission), kernels are compiled in memory.  Both cases print one line.
 """
 
 import hashlib
@@ -26,16 +25,16 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 from estimator.compiler import compiling, owner
 from estimator.compiler.sources import OURS, Sources
 
-_KEPT = 4  # folders of one module, for other versions of its sources
-_IN_USE_S = 86_400.0  # a folder that was used within this time is left alone
-_UNUSED_S = 30 * 86_400.0  # one that was not used within this time is removed
-_LARGEST = 100_000_000  # bytes; no kernel is nearly as large
+_KEPT = 4  # folders kept per module, for other versions of its sources
+_IN_USE_S = 86_400.0  # a folder used within this time is kept
+_UNUSED_S = 30 * 86_400.0  # a folder not used within this time is removed
+_LARGEST = 100_000_000  # bytes; no kernel comes near
 _CHECKSUM = hashlib.sha256().digest_size
 _sources = Sources()
 
 
 class Damaged(Exception):
-    """A file of the cache is not what was written there."""
+    """A file of the cache has changed since it was written."""
 
 
 @cache
@@ -44,18 +43,18 @@ def base() -> Path:
     home = os.environ.get("XDG_CACHE_HOME")
     try:
         return (Path(home) if home else Path.home() / ".cache").absolute() / "wingslevel" / "kernels"
-    except (RuntimeError, OSError):  # nobody's home, or the working directory has gone
+    except (RuntimeError, OSError):  # no home folder, or the working directory has been removed
         return Path(os.devnull) / "kernels"
 
 
 def cache_of(function: Any) -> "KernelCache | None":
-    """The cache of a Python function that is to be compiled; None where it stands in no file."""
+    """The cache of a Python function to be compiled; None if it is not in a file."""
     path = os.path.realpath(function.__code__.co_filename)
     return KernelCache(function, path) if os.path.isfile(path) else None
 
 
 class KernelCache(FunctionCache):  # type: ignore[misc]
-    """numba's cache of the function `py_func`, which stands in the file at `path`."""
+    """numba's cache of the function `py_func`, defined in the file at `path`."""
 
     def __init__(self, py_func: Any, path: str) -> None:
         digest = _sources.digest(path)
@@ -67,12 +66,12 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         self.enable()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was compiled for the signature `sig`, None where it has to be compiled."""
+        """The code compiled for the signature `sig`, None if it has to be compiled."""
         _tidy()
-        with compiling.held():  # it calls back from C, as the compiler does
+        with compiling.held():  # it calls back from C, like the compiler
             try:
                 found = super().load_overload(sig, target_context)
-            except Exception as fault:  # a file may hold anything
+            except Exception as fault:  # a file may contain anything
                 self._discard(fault)
                 return None
         if found is not None:
@@ -80,9 +79,9 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled for the signature `sig`, where that is possible."""
+        """Store the code compiled for the signature `sig`, if possible."""
         if not _sources.unchanged(self._source):
-            return  # edited since it was read: what was compiled may be of either
+            return  # edited since it was read: the code may come from either version
         try:
             is_new = not self._folder.is_dir()
             with compiling.held():
@@ -91,12 +90,12 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
                 _prune(self._folder)
         except OSError as error:
             reason = error.strerror or type(error).__name__
-            compiling.trouble(f"cannot write to {self._folder}: {reason}; what is compiled is not kept")
-        except Exception as fault:  # a function of a person's own may hold what cannot be written
-            compiling.trouble(f"cannot keep {self._name}: {type(fault).__name__}; it is compiled every time")
+            compiling.trouble(f"cannot write to {self._folder}: {reason}; kernels are compiled again next time")
+        except Exception as fault:  # a user's function may hold what cannot be pickled
+            compiling.trouble(f"cannot store {self._name}: {type(fault).__name__}; it is compiled every time")
 
     def _discard(self, fault: Exception) -> None:
-        """Throw away what was found for this function, and tell, unless another process was first."""
+        """Discard the files of this function, and report it unless another process was first."""
         files = self._cache_file.files()
         removed = [_remove(path) for path in (files if self._folder.is_dir() else [self._folder])]
         if any(removed) or not isinstance(fault, Damaged):
@@ -105,9 +104,9 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
 
 
 def _folder_name(py_func: Any, path: str) -> str:
-    """Of the module that `py_func` is of.
+    """Name of the folder of the module that defines `py_func`.
 
-    The compiler keeps the name of the module with what it made, and a file of others may be loaded under several.
+    The compiler stores the name of the module with the code, and a user's file may be loaded under several names.
     """
     module = str(py_func.__module__ or "")
     ours = module.partition(".")[0] in OURS
@@ -115,7 +114,7 @@ def _folder_name(py_func: Any, path: str) -> str:
 
 
 class _Locator:
-    """Where numba asks for the folder of a function, and for the version of its source."""
+    """Tells numba the folder of a function and the version of its source."""
 
     def __init__(self, folder: Path, path: str, digest: str, line: int) -> None:
         self._folder, self._py_file, self._digest, self._line = folder, path, digest, line
@@ -123,7 +122,7 @@ class _Locator:
     def ensure_cache_path(self) -> None:
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-        except FileExistsError:  # something else has its name
+        except FileExistsError:  # a file has its name
             self._folder.unlink()
             self._folder.mkdir()
 
@@ -138,7 +137,7 @@ class _Locator:
 
 
 class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
-    """How numba makes bytes of what it compiled; the place is ours."""
+    """numba's serialisation of compiled code, in our folder."""
 
     def __init__(self, py_func: Any, locator: _Locator) -> None:
         self._locator = locator
@@ -152,12 +151,12 @@ class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
 class _Files(IndexDataCacheFile):  # type: ignore[misc]
     """The index and the data files of one function, each with its checksum.
 
-    A data file is named by its key, so processes that write at the same time write the same file; it holds its
-    key, and is there before the index names it.
+    A data file is named by its key, so processes that write at the same time write the same file; it contains its key,
+    and is written before the index names it.
     """
 
     def files(self) -> list[Path]:
-        """All there are, or were meant to be."""
+        """All files of the function."""
         stem = self._index_name.removesuffix("nbi")
         folder = Path(self._cache_path)
         with suppress(OSError):
@@ -189,7 +188,7 @@ class _Files(IndexDataCacheFile):  # type: ignore[misc]
             data = _read(self._index_path)
         except FileNotFoundError:
             return {}
-        version, rest = pickle.loads(data)  # the rest is not looked into where the version is another
+        version, rest = pickle.loads(data)  # the rest is not read for another version
         if version != self._version:
             return {}
         stamp, overloads = pickle.loads(rest)
@@ -207,7 +206,7 @@ class _Files(IndexDataCacheFile):  # type: ignore[misc]
 
 
 def _read(path: str) -> bytes:
-    """The content of a file, without its checksum; Damaged where that is wrong."""
+    """The content of a file without its checksum; Damaged if that is wrong."""
     try:
         about = os.stat(path)
         if not stat.S_ISREG(about.st_mode) or about.st_size > _LARGEST:
@@ -236,16 +235,16 @@ def _write(path: str, content: bytes) -> None:
             file.write(content)
         os.replace(temporary, path)
     finally:
-        with suppress(OSError):  # where it was renamed there is nothing left
+        with suppress(OSError):  # already gone if it was renamed
             os.unlink(temporary)
 
 
 def _remove(path: Path) -> bool:
-    """Remove a file or a folder; whether that was done here."""
+    """Remove a file or a folder; returns whether this process did."""
     try:
         if path.is_dir() and not path.is_symlink():
             aside = path.with_name(f".{path.name[-60:]}.{owner.mark()}")
-            path.rename(aside)  # at once: nobody finds half of it
+            path.rename(aside)  # atomic: no process finds half of it
             shutil.rmtree(aside, ignore_errors=True)
         else:
             path.unlink()
@@ -255,14 +254,14 @@ def _remove(path: Path) -> bool:
 
 
 def _touch(folder: Path) -> None:
-    """Note that the folder was used, once in a while."""
+    """Record that the folder was used, now and then."""
     with suppress(OSError):
         if time.time() - folder.stat().st_mtime > 0.1 * _IN_USE_S:
             os.utime(folder)
 
 
 def _prune(new: Path) -> None:
-    """Remove folders of other versions of the module whose folder is `new`: all but the few used last."""
+    """Remove folders of other versions of the module whose folder is `new`: all but the few used most recently."""
     module = new.name.rpartition("-")[0]
     others = [(folder, age_s) for folder, age_s in _folders() if folder.name.rpartition("-")[0] == module]
     for folder, age_s in others[_KEPT:]:
@@ -272,7 +271,7 @@ def _prune(new: Path) -> None:
 
 @cache
 def _tidy() -> None:
-    """Remove what nobody needs: once in a process, before the first kernel is looked for."""
+    """Remove unused folders and leftover files: once per process, before the first kernel is loaded."""
     for folder, age_s in _folders():
         if age_s > _UNUSED_S or owner.is_left_behind(folder):
             _remove(folder)
@@ -284,7 +283,7 @@ def _tidy() -> None:
 
 
 def _folders() -> list[tuple[Path, float]]:
-    """The folders of the cache with the time since each was used, seconds; the oldest last."""
+    """The folders of the cache with the time in seconds since each was used; the oldest last."""
     now_s, found = time.time(), []
     with suppress(OSError):
         for entry in os.scandir(base()):
@@ -293,9 +292,9 @@ def _folders() -> list[tuple[Path, float]]:
 
 
 def _short(fault: Exception) -> str:
-    """The kind of a fault, and the beginning of what it says."""
+    """The type of a fault and the beginning of its message."""
     try:
         text = " ".join(str(fault).split())[:120]
-    except Exception:  # it is anyone's class
+    except Exception:  # any class may raise here
         text = ""
     return f"{type(fault).__name__}: {text}" if text else type(fault).__name__

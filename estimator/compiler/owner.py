@@ -1,8 +1,7 @@
-"""Who made a temporary file: a mark of this process for its name, and whether the process of a mark still lives.
+"""Names of temporary files that identify the process, and whether that process is still running.
 
-A process that is killed leaves its temporary files behind.  The next one removes those of the dead, and leaves those
-of the living alone.  A process number alone does not tell them apart, it is given again: the mark also carries when
-the process began, and on which machine.
+A process that is killed leaves its temporary files behind.  The next one removes those of processes that have ended.
+Process numbers are reused: the mark therefore also contains the start time of the process and the machine.
 """
 
 import hashlib
@@ -13,26 +12,26 @@ import time
 from functools import cache
 from pathlib import Path
 
-FOREIGN_S = 86_400.0  # what another machine left is taken for dead when it has not changed for a day
+FOREIGN_S = 86_400.0  # a file of another machine counts as left behind after a day without change
 _MARK = re.compile(r"(?<![^.])(\d+)-(\d+)-([0-9a-f]{8})-([0-9a-f]{8})\.tmp(?![^.])")
 
 
 def mark() -> str:
-    """The mark of this process, to be a part of a name between two dots: ``.report.<mark>.json``.
+    """The mark of this process, for use in a name between two dots: ``.report.<mark>.json``.
 
-    It ends in ``.tmp``.  Same process, same mark: what is made twice at a time needs a number of its own beside it.
+    It ends in ``.tmp``.  One process has one mark: two files of one name at a time need a number as well.
     """
     pid = os.getpid()
     return f"{pid}-{_began(pid)}-{_host()}-{_boot()}.tmp"
 
 
 def is_temporary(name: str) -> bool:
-    """Whether a file of this name carries the mark of some process."""
+    """Whether a file of this name has the mark of a process."""
     return name.startswith(".") and _MARK.search(name) is not None
 
 
 def is_left_behind(path: Path) -> bool:
-    """Whether the file or folder at `path` carries the mark of a process that is gone."""
+    """Whether the file or folder at `path` has the mark of a process that has ended."""
     found = _MARK.search(path.name)
     if not path.name.startswith(".") or found is None:
         return False
@@ -41,35 +40,35 @@ def is_left_behind(path: Path) -> bool:
         try:
             return time.time() - path.lstat().st_mtime > FOREIGN_S
         except OSError:
-            return False  # it has gone by now
+            return False  # removed meanwhile
     return boot != _boot() or not _lives(int(pid), began)
 
 
 def _lives(pid: int, began: str) -> bool:
-    """Whether process `pid` runs, and is the one that `began` then."""
+    """Whether process `pid` is running and started at `began`."""
     try:
         os.kill(pid, 0)
     except (ProcessLookupError, OverflowError):
         return False
     except OSError:
-        pass  # somebody else's, or a system that does not tell
+        pass  # another user's process, or a system that does not say
     now = _began(pid)
     return "0" in (began, now) or began == now
 
 
 def _began(pid: int) -> str:
-    """When the process began, in ticks since the machine did; 0 where the system does not tell, or it is dead."""
+    """Start time of the process in ticks since boot; 0 if it has ended or the system does not say."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:
         return "0"
     state, *fields = stat.rpartition(")")[2].split()
-    return "1" if state in "ZX" else fields[18]  # a zombie writes no more
+    return "1" if state in "ZX" else fields[18]  # a zombie no longer writes
 
 
 @cache
 def _host() -> str:
-    """The machine, or the container, in 8 hexadecimal digits: where process numbers mean the same."""
+    """The machine or container in 8 hexadecimal digits: process numbers are unique within it."""
     try:
         numbers = os.readlink("/proc/self/ns/pid")
     except OSError:
@@ -79,7 +78,7 @@ def _host() -> str:
 
 @cache
 def _boot() -> str:
-    """The time since the machine was started, in 8 hexadecimal digits."""
+    """The present boot of the machine, in 8 hexadecimal digits."""
     try:
         return _short(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii"))
     except OSError:

@@ -1,8 +1,8 @@
-"""The sources on which a compiled kernel depends: its own module, and all that this one imports, directly or not.
+"""The sources on which a compiled kernel depends: its module and everything that it imports, directly or not.
 
-Imports are found in the text, wherever they stand: at the top, in a function, over several lines.  One that is never
-executed counts as well; that costs a compilation, one that is missed would run old code.  Other people's packages are
-not read: of those that a person's own file imports it is noted which file it is, how long, and when it was changed.
+Imports are found in the text: at the top, in a function, over several lines.  An import that is never executed counts
+as well: that costs a compilation, whereas a missed one would run old code.  Installed packages are not read: for those
+that a user's file imports, the path, size and time of change of each file are used.
 
 This runs whenever a module with kernels is imported: paths are plain strings here, which is five times as fast.
 """
@@ -26,7 +26,7 @@ _COMMENT = re.compile(r"#[^\n]*")
 
 
 class Sources:
-    """Digests of the import closures of files, each file being read once.
+    """Digests of the import closures of files; each file is read once.
 
     root : folder of our packages
     """
@@ -58,18 +58,18 @@ class Sources:
         return whole.hexdigest()[:16]
 
     def unchanged(self, path: str) -> bool:
-        """Whether the closure of `path` is on disk what it was when it was read."""
+        """Whether the closure of `path` is unchanged on disk since it was read."""
         return all(_stat(source) == self._stats[source] for source in self.closure(path))
 
     def _imports_of(self, path: str) -> tuple[str, ...]:
-        """The files that the one at `path` imports; read and noted the first time."""
+        """The files that the one at `path` imports; read once."""
         if path not in self._imports:
             self._stats[path] = _stat(path)
             try:
                 with open(path, "rb") as file:
                     data = file.read()
             except OSError:
-                data = b""  # gone since: what was imported from it cannot be told
+                data = b""  # removed since: its imports are unknown
             self._digests[path] = hashlib.sha256(data).hexdigest()
             found = dict.fromkeys(file for name in imported(data) for file in self._files_of(name, path))
             self._imports[path] = tuple(file for file in found if file != path)
@@ -99,14 +99,14 @@ class Sources:
         return found
 
     def _note(self, files: tuple[str, ...]) -> None:
-        """Take those of `files` that were installed for what their sizes and times say they are."""
+        """Identify those of `files` that are installed by size and time."""
         for path in files:
             if path not in self._imports and _is_library(path):
                 self._stats[path] = _stat(path)
                 self._digests[path], self._imports[path] = f"{self._stats[path]}", ()
 
     def _below(self, base: str, name: str) -> tuple[str, ...]:
-        """The files of the packages, and of the module, that `name` goes through below the folder `base`."""
+        """The files of the packages and of the module along the dotted `name`, below the folder `base`."""
         key = (base, name)
         if key in self._located:
             return self._located[key]
@@ -115,7 +115,7 @@ class Sources:
             found = self._below(base, above) if above else ()
             here = os.path.join(base, *name.split("."))
             if found and not found[-1].endswith("__init__.py"):
-                pass  # what follows is a name in a module
+                pass  # the rest is a name in a module
             elif isfile(os.path.join(here, "__init__.py")):
                 found = (*found, os.path.join(here, "__init__.py"))
             elif isfile(f"{here}.py"):
@@ -130,7 +130,7 @@ class Sources:
 def imported(source: bytes) -> Iterator[str]:
     """Names that the text of a module imports, as written, relative ones with their dots.
 
-    ``from a import b`` gives ``a`` and ``a.b``: whether `b` is a module or a name in one cannot be told from here.
+    ``from a import b`` gives ``a`` and ``a.b``: `b` may be a module or a name in one.
     """
     text = source.decode("utf-8", "replace")
     if "\\" in text or "\r" in text:
@@ -143,7 +143,7 @@ def imported(source: bytes) -> Iterator[str]:
         match = None
         if not before:
             match = _PLAIN.match(text, at)
-        elif before.startswith("from"):  # else it is a word in a text
+        elif before.startswith("from"):  # else it is a word in prose
             match = _FROM.match(text, text.index("from", line))
         if match:
             yield from _names_of(match)
@@ -172,7 +172,7 @@ def _listed(text: str) -> Iterator[str]:
 
 
 def _stat(path: str) -> tuple[int, int]:
-    """Size and time of change, zeros for a file that is gone."""
+    """Size and time of change, zeros if the file is gone."""
     try:
         found = os.stat(path)
     except OSError:
@@ -181,7 +181,7 @@ def _stat(path: str) -> tuple[int, int]:
 
 
 def _package_of(path: str) -> str:
-    """Folder of the outermost package that the module at `path` is in; the module, where it is in none."""
+    """Folder of the outermost package of the module at `path`; the module itself if it is in none."""
     top = path
     while isfile(os.path.join(dirname(top), "__init__.py")) and dirname(top) != top:
         top = dirname(top)
@@ -189,7 +189,7 @@ def _package_of(path: str) -> str:
 
 
 def _files_of_module(name: str) -> Iterator[str]:
-    """Where a module that has been imported came from, for those that no folder holds under their name."""
+    """File of an imported module, for modules that are in no folder of their name."""
     while name:
         file = getattr(sys.modules.get(name), "__file__", None)
         if file and file.endswith(".py"):
@@ -207,5 +207,5 @@ def _libraries() -> tuple[str, ...]:
 
 
 def _is_library(path: str) -> bool:
-    """Whether the file at `path` was installed, and is not being written."""
+    """Whether the file at `path` belongs to an installed package."""
     return f"{os.sep}site-packages{os.sep}" in path or "dist-packages" in path or path.startswith(_libraries())

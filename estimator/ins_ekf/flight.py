@@ -1,13 +1,10 @@
-"""What `estimator.ins_ekf` does to its filter: how it starts, what it takes in, one sample after the other.
-
-`s` is a record of `estimator.ins_ekf.STATE_DTYPE` throughout; the story is told there.
-"""
+"""Start, measurements and restart of `estimator.ins_ekf`; `s` is a record of its `STATE_DTYPE`, explained there."""
 
 import math
 
 import numpy as np
 
-from estimator.blocks.kernels import wrap
+from estimator.blocks.kernels import dot, wrap
 from estimator.blocks.screening import AIR, GPS, MAG, refuse
 from estimator.compiler.jit import kernel
 from estimator.ins_ekf.kernels import (
@@ -31,25 +28,25 @@ from estimator.ins_ekf.kernels import (
 )
 from estimator.rotation import level, renormalise
 
-SIZE = 640  # samples that can wait: 12.8 s at 50 Hz, 3.2 s at 200 Hz
+SIZE = 640  # most waiting samples: 12.8 s at 50 Hz, 3.2 s at 200 Hz
 PSEUDO_S = 0.2  # from one pseudo-measurement to the next
-FIX_LIFE_S = 2.0  # without a fix for longer, the velocity is believed to stay
-RESTART_S = 3.0  # fixes refused for longer: start again
-SLOWEST_AIRSPEED_M_S = 5.0  # slower, sideslip says nothing
+FIX_LIFE_S = 2.0  # without a fix for longer, the velocity is assumed to stay
+RESTART_S = 3.0  # fixes rejected for longer: restart
+SLOWEST_AIRSPEED_M_S = 5.0  # slowest at which no sideslip is assumed
 CRUISE_S = 5.0  # time constant of the remembered airspeed
 HELD_SPEED_M_S, SILENT_SPEED_M_S = 0.5, 3.0  # sigmas of a speed: at rest, remembered
-HELD_M_S2 = 0.5  # sigma of the acceleration of something standing or held
+HELD_M_S2 = 0.5  # sigma of the acceleration while standing or held
 START_TILT_RAD, RESTART_TILT_RAD = math.radians(15.0), 0.7
-STEADY_M_S = 1.0  # how far the receiver's filter may have been behind at the start
-FRAME_RAD = 0.01  # sigma of the heading before a match: none, in a frame of its own
-MATCH_RAD = 1.0  # sigma of the heading before a match, which the fix that follows replaces
+STEADY_M_S = 1.0  # sigma of the receiver's filter lag at the start
+FRAME_RAD = 0.01  # sigma of the heading in the frame of unknown heading, before a match
+MATCH_RAD = 1.0  # sigma of the heading at a match; the fix then corrects it
 STANDING_M_S = 0.3  # sigma of a fix of exactly zero: some receivers report that at low speed (static navigation)
-TANGENT_SHARE = 0.5  # of the variance of the latency that a tangent leaves out: in a throw the rate changes within it
-SURPRISE_SHARE, MOST_SURPRISE = 0.1, 50.0  # weight of a fix in the mean, and the most that one can count
+TANGENT_SHARE = 0.5  # of the latency's variance, for the error of the tangent: in a throw the rate changes within it
+SURPRISE_SHARE, MOST_SURPRISE = 0.1, 50.0  # weight of a fix in the mean, and its largest value
 CUT_GYRO, CUT_FORCE, HAS_FIX, HAS_MAG, HAS_AIR, STAMPED = 1, 2, 4, 8, 16, 32  # bits of a waiting sample
 
 
-# How it starts
+# Start
 
 
 @kernel
@@ -63,7 +60,7 @@ def forget(P, first, count, sigma):  # type: ignore[no-untyped-def]
 
 @kernel
 def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
-    """Begin anew from attitude, biases and wind as they are; velocity zero, of the `speed_sigma_m_s` given."""
+    """Restart from the present attitude and biases; velocity zero with `speed_sigma_m_s`, wind zero."""
     forget(s.P, TILT, 3, tilt_sigma_rad)
     forget(s.P, TILT + 2, 1, FRAME_RAD)
     forget(s.P, BIAS, 3, s.gyro_bias_sigma_rad_s)
@@ -71,7 +68,7 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
     forget(s.P, FORCE, 3, s.force_bias_sigma_m_s2)
     forget(s.P, LAG, 3, speed_sigma_m_s)
     forget(s.P, VEL, 3, np.hypot(speed_sigma_m_s, STEADY_M_S))
-    for i in range(3):  # a receiver in steady motion holds the velocity there is
+    for i in range(3):  # in steady motion the receiver's velocity is the true one
         s.P[VEL + i, LAG + i] = s.P[LAG + i, VEL + i] = speed_sigma_m_s**2
     forget(s.P, LATENCY, 1, s.gps_latency_sigma_s)
     length = max(np.hypot(s.R_filter_eb[0, 0], s.R_filter_eb[1, 0]), 1e-3)
@@ -87,16 +84,14 @@ def start(s, tilt_sigma_rad, speed_sigma_m_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def start_at_rest(state, force):  # type: ignore[no-untyped-def]
-    """Begin at rest: no velocity, and a tilt that rests on the mean reading `force`, shape (3,), whose bias it has."""
+    """Start at rest: no velocity, tilt from the mean reading `force`, shape (3,), with which its bias is correlated."""
     s = state[0]
     start(s, START_TILT_RAD, HELD_SPEED_M_S)
     s.seeded = 1
     R, h = s.R_filter_eb, s.h
-    for axis in range(2):  # the acceleration along north and east is nought
+    for axis in range(2):  # the acceleration along north and east is zero
         no_gradient(h)
-        f0 = R[0, 0] * force[0] + R[0, 1] * force[1] + R[0, 2] * force[2]
-        f1 = R[1, 0] * force[0] + R[1, 1] * force[1] + R[1, 2] * force[2]
-        f2 = R[2, 0] * force[0] + R[2, 1] * force[1] + R[2, 2] * force[2]
+        f0, f1, f2 = dot(R[0], force), dot(R[1], force), dot(R[2], force)
         if axis == 0:
             h[TILT + 1], h[TILT + 2] = f2, -f1
         else:
@@ -108,7 +103,7 @@ def start_at_rest(state, force):  # type: ignore[no-untyped-def]
 
 @kernel
 def start_in_air(state):  # type: ignore[no-untyped-def]
-    """Begin in flight: nothing known but that it is roughly level."""
+    """Start in flight: roughly level, all else unknown."""
     start(state[0], START_TILT_RAD, state[0].wind_sigma_m_s)
 
 
@@ -123,7 +118,7 @@ def turn_pairs(P, c, z):  # type: ignore[no-untyped-def]
 
 @kernel
 def turn_heading(s, angle_rad):  # type: ignore[no-untyped-def]
-    """Turn the whole estimate about the vertical: what was believed in a frame of unknown heading, with it."""
+    """Turn the whole estimate about the vertical, out of the frame of unknown heading."""
     turn_in_earth(s.R_filter_eb, 0.0, 0.0, angle_rad)
     c, z = np.cos(angle_rad), np.sin(angle_rad)
     for v in (s.v_e_m_s, s.lagged_v_e_m_s, s.lagged_rate_m_s2, s.wind_e_m_s):
@@ -137,7 +132,7 @@ def turn_heading(s, angle_rad):  # type: ignore[no-untyped-def]
 
 @kernel
 def doubt_heading(s, sigma_rad):  # type: ignore[no-untyped-def]
-    """Add an error of heading with which both velocities turn."""
+    """Add an uncertainty of heading with which both velocities turn."""
     h = s.h
     no_gradient(h)
     h[TILT + 2] = sigma_rad
@@ -152,10 +147,10 @@ def doubt_heading(s, sigma_rad):  # type: ignore[no-untyped-def]
 def begin_with_fix(s, z, fast):  # type: ignore[no-untyped-def]
     """Take the velocity at the start, along the nose there, from the first fix `z`, shape (3,).
 
-    What has happened since the start is believed: the receiver would now hold y, had the start been at rest, and
-    holds y + V nose. V is the speed with which that is as long as the fix; its direction is matched afterwards.
+    The motion since the start is trusted: with a start at rest the receiver would now hold y, so it holds y + V nose.
+    V makes that as long as the fix; its direction is matched afterwards.
     """
-    if s.fix_age_s > FIX_LIFE_S:  # the start is long past: it shall be now
+    if s.fix_age_s > FIX_LIFE_S:  # the start was too long ago: start now
         start(s, max(START_TILT_RAD, np.sqrt(s.P[TILT, TILT])), s.wind_sigma_m_s)
     y, n = s.lagged_v_e_m_s, s.nose_at_start
     speed = 0.0
@@ -169,24 +164,24 @@ def begin_with_fix(s, z, fast):  # type: ignore[no-untyped-def]
     s.seeded = 1
 
 
-# What is measured
+# Measurements
 
 
 @kernel
 def find_heading(s, z, speed):  # type: ignore[no-untyped-def]
-    """Turn the estimate so that the velocity believed to be inside the receiver is that of the fix `z`, shape (3,).
+    """Turn the estimate so that its velocity inside the receiver points along the fix `z`, shape (3,).
 
     Returns
     -------
-    bool    False where that velocity is not known well enough, or too slow: the fix cannot be used
+    bool    False if that velocity is too uncertain or too slow: the fix cannot be used
     """
     y0, y1 = s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]
     if s.P[LAG, LAG] + s.P[LAG + 1, LAG + 1] > max(speed, s.wind_sigma_m_s * 1.5) ** 2:
-        s.seeded = 0  # drifted too far to be matched: begin again with the next fix
+        s.seeded = 0  # too uncertain for a match: start again with the next fix
         s.fix_age_s = math.inf
         return False
     if np.hypot(y0, y1) < 0.5 * s.min_speed_m_s:
-        return False  # moving, and not yet known to be
+        return False  # the receiver reports motion that the estimate does not have yet
     turn_heading(s, np.arctan2(z[1], z[0]) - np.arctan2(y1, y0))
     doubt_heading(s, MATCH_RAD)
     s.aligned = 1
@@ -195,16 +190,16 @@ def find_heading(s, z, speed):  # type: ignore[no-untyped-def]
 
 @kernel
 def was_never_at_rest(s, speed):  # type: ignore[no-untyped-def]
-    """Whether a fix is too fast for a start at rest: the flight did not begin where the gyros were calibrated."""
+    """Whether a fix is too fast for a start at rest: the flight then began in the air."""
     sigma = np.sqrt(max(s.P[LAG, LAG], s.P[LAG + 1, LAG + 1]))
     return speed - np.hypot(s.lagged_v_e_m_s[0], s.lagged_v_e_m_s[1]) > 0.5 * s.min_speed_m_s + s.gate * sigma
 
 
 @kernel
 def take_fix(s, i):  # type: ignore[no-untyped-def]
-    """Take in the fix beside waiting sample `i`; the filter is at the end of that sample."""
+    """Use the fix beside waiting sample `i`; the filter is at the end of that sample."""
     z, early = s.w_fix_v_e_m_s[i], s.w_fix_early_s[i]
-    unsure = STANDING_M_S if z[0] == 0.0 and z[1] == 0.0 else 0.0  # sigma beside the receiver's noise
+    unsure = STANDING_M_S if z[0] == 0.0 and z[1] == 0.0 else 0.0  # sigma besides the receiver's noise
     for j in range(3):  # to the end of the sample
         z[j] += early * s.lagged_rate_m_s2[j]
     speed = np.hypot(z[0], z[1])
@@ -219,7 +214,7 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
             unsure = max(speed, unsure)  # a horizontal velocity has no direction yet
         elif not find_heading(s, z, speed):
             return
-    if believe_velocity(s, i, z, unsure):
+    if fuse_velocity(s, i, z, unsure):
         s.fix_age_s = s.refusing_s = 0.0
         return
     refuse(s, GPS)
@@ -229,19 +224,19 @@ def take_fix(s, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def believe_velocity(s, i, z, unsure):  # type: ignore[no-untyped-def]
-    """Fuse the velocity `z`, shape (3,), of the fix beside waiting sample `i`; whether all of it was believed.
+def fuse_velocity(s, i, z, unsure):  # type: ignore[no-untyped-def]
+    """Fuse the velocity `z`, shape (3,), of the fix beside waiting sample `i`; returns whether all of it was accepted.
 
     unsure : further sigma of the horizontal components, m/s
 
-    Where innovations are larger than they should be, the noise of the receiver is taken for larger in proportion: it
-    is that of another receiver, or the aeroplane shakes its sensors more than data sheets know.
+    If innovations are larger than expected, the noise of the receiver is scaled up in proportion: the receiver is
+    worse than assumed, or vibration is.
     """
     stamped = (s.w_bits[i] & STAMPED) != 0
     components = 3 if s.gps_vertical_velocity else 2
     noise = s.gps_noise_m_s**2
     more = noise * (max(1.0, s.surprise) - 1.0)
-    believed, surprise = 0, 0.0
+    accepted, surprise = 0, 0.0
     for j in range(components):
         rate = s.lagged_rate_m_s2[j]
         no_gradient(s.h)
@@ -254,16 +249,16 @@ def believe_velocity(s, i, z, unsure):  # type: ignore[no-untyped-def]
         variance = noise + more + doubt * rate * rate
         if j < 2:
             variance += unsure * unsure
-        believed += fuse(s, innovation, variance, s.gate)
+        accepted += fuse(s, innovation, variance, s.gate)
         surprise += min(innovation * innovation / (s.expected - more), MOST_SURPRISE)
     if s.aligned:
         s.surprise += SURPRISE_SHARE * (surprise / components - s.surprise)
-    return believed == components
+    return accepted == components
 
 
 @kernel
 def restart(s):  # type: ignore[no-untyped-def]
-    """Begin again in the air, from the attitude there is, or level where that has been upside down for seconds."""
+    """Restart in the air, from the present attitude, or level if it has been inverted for seconds."""
     if s.lift_e_m_s2 > 0.0:
         level(s.R_filter_eb)
     start(s, RESTART_TILT_RAD, s.wind_sigma_m_s)
@@ -272,10 +267,10 @@ def restart(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_mag(s, i):  # type: ignore[no-untyped-def]
-    """Take in the magnetic heading beside waiting sample `i`; the first one starts the heading.
+    """Use the magnetic heading beside waiting sample `i`; the first one sets the heading.
 
-    The iron of an aeroplane can turn a field that was never calibrated by any angle: such a field only says where
-    the frame of unknown heading points until a moving fix comes.
+    Iron can turn an uncalibrated field by any angle: such a field only turns the frame of unknown heading, until a
+    moving fix comes.
     """
     innovation = wrap(s.declination_rad - magnetic_course(s, s.w_mag_b_ut[i]))
     if not s.magnetometer_calibrated:
@@ -294,7 +289,7 @@ def take_mag(s, i):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_airspeed(s, i):  # type: ignore[no-untyped-def]
-    """Take in the airspeed beside waiting sample `i`, in flight."""
+    """Use the airspeed beside waiting sample `i`, in flight."""
     if s.seeded and s.aligned and s.w_airspeed_m_s[i] > SLOWEST_AIRSPEED_M_S:
         innovation = s.w_airspeed_m_s[i] - airspeed(s)
         if not fuse(s, innovation, s.airspeed_noise_m_s**2, s.gate):
@@ -303,7 +298,7 @@ def take_airspeed(s, i):  # type: ignore[no-untyped-def]
 
 @kernel
 def take_pseudo(s):  # type: ignore[no-untyped-def]
-    """No sideslip in flight; without vertical velocity, little incidence; without GPS, the airspeed of late."""
+    """No sideslip in flight; without vertical velocity, little incidence; without GPS, the recent airspeed."""
     along = through_air(s, 0)
     silent = s.fix_age_s > FIX_LIFE_S
     if s.aligned and along > SLOWEST_AIRSPEED_M_S:
@@ -327,7 +322,7 @@ def take_pseudo(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def advance_filter(s):  # type: ignore[no-untyped-def]
-    """Take the oldest waiting sample into the filter, with what lies beside it; whether anything was corrected."""
+    """Advance the filter by the oldest waiting sample and what lies beside it; returns whether it was corrected."""
     i = s.oldest
     bits, dt = s.w_bits[i], s.w_dt_s[i]
     predict(s, s.w_gyro[i], s.w_force[i], dt, bits & CUT_GYRO, bits & CUT_FORCE)
@@ -355,7 +350,7 @@ def advance_filter(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def keep_sane(s):  # type: ignore[no-untyped-def]
-    """Hold the attitude on SO(3); begin again where a number has run away."""
+    """Keep the attitude on SO(3); restart if a number has diverged."""
     total = 0.0
     for i in range(N):
         total += s.P[i, i]

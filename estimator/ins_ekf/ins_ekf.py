@@ -1,8 +1,8 @@
-"""An inertial navigation filter that models its sensors: what accuracy is possible, at twenty times the cost.
+"""An inertial navigation filter that models its sensors: the achievable accuracy, at twenty times the cost.
 
 An error-state Kalman filter of 21 states (`estimator.ins_ekf.kernels`): attitude, velocity, gyro bias and gain,
 accelerometer bias, the velocity inside the GPS receiver behind its filter, the horizontal wind, and the latency of the
-receiver.  `InsEkfParams` says how good its sensors are; `InsEkf.sigma` says how good its estimate is.
+receiver.  `InsEkfParams` describes its sensors; `InsEkf.sigma` gives the accuracy of its estimate.
 
 *Delayed horizon.*  A fix is old when it arrives.  The filter therefore runs one latency behind the present; inertial
 samples wait in a buffer, each fix beside the sample in which it was true.  The attitude of the present is that of the
@@ -14,26 +14,26 @@ whenever the aeroplane accelerates (Skog and Handel; Li and Mourikis).  A fix th
 changed is moved along the same tangent.  `InsEkf.learnt` reports the latency once it is known.  A delay and a
 first-order filter look alike at low frequencies: a wrong ``gps_filter_s`` is largely absorbed by the latency.
 
-*Sideslip.*  An aeroplane flies where its nose points: that the velocity through the air has no component along the
-wing is a measurement five times a second.  It separates nose and course, and so yields wind and heading.  Where the
-receiver reports no vertical velocity, the same is assumed of the body's z axis, with a larger sigma.
+*Sideslip.*  An aeroplane flies where its nose points: zero velocity through the air along the wing is a measurement
+five times a second.  It separates nose and course, and so yields wind and heading.  If the receiver reports no vertical
+velocity, the same is assumed of the body's z axis, with a larger sigma.
 
 *Heading at the start.*  A Kalman filter cannot represent an error of half a turn.  Until the aeroplane moves, the
-heading is that of the magnetometer, or north, and does no harm: nothing measured has a direction.  The throw is then
+heading is that of the magnetometer, or north, and does no harm: no measurement has a direction.  The throw is then
 integrated like any motion, in a frame of unknown heading; once the GPS reports a velocity, the angle between that and
-the velocity believed to be inside the receiver is the heading error, whatever the wind.  The whole estimate is turned
-by it, and the fix is then fused with a heading (and the velocities that turn with it) uncertain by a radian.  A start
-in the air is the same with one more unknown, the speed along the nose, which makes the velocities equally long.  A fix
+the velocity estimated inside the receiver is the heading error, whatever the wind.  The whole estimate is turned by it,
+and the fix is then fused with a heading (and the velocities that turn with it) uncertain by a radian.  A start in the
+air is the same with one more unknown, the speed along the nose, which makes the two velocities equally long.  A fix
 much faster than a start at rest allows means that the flight began in the air after all.
 
-*Readings cut off* at full scale: for these samples the process noise is that of what may be missing.
+*Clipped readings*: for these samples the process noise covers what may be missing.
 
-*Without GPS* for two seconds, the velocity through the air is assumed to be what it was, along the nose, with a large
+*Without GPS* for two seconds, the velocity through the air is assumed to stay what it was, along the nose, with a large
 sigma; without any velocity ever, zero.  That is gravity aiding, weak enough for turns, for as long as it lasts.
 
-*Rejected fixes.*  An innovation beyond `gate` sigmas is rejected and counted.  Where innovations stay larger than their
-sigmas, the receiver's noise is scaled up to match.  Where nothing is accepted for three seconds the filter is wrong,
-not the receiver: it starts again in the air, from its attitude.
+*Rejected fixes.*  An innovation beyond `gate` sigmas is rejected and counted.  If innovations stay larger than their
+sigmas, the receiver's noise is scaled up to match.  If nothing is accepted for three seconds the filter is wrong, not
+the receiver: it restarts in the air, from its attitude.
 
 The earth's rotation (15 deg/h) and curvature are left out; they are below the gyro's walk.
 
@@ -56,7 +56,7 @@ import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.magnetometer import FIELD, take_field
-from estimator.blocks.screening import FORCE_GOOD, GPS, GYRO_GOOD, airspeed_came, refuse, screen
+from estimator.blocks.screening import COAST_S, FORCE_GOOD, GPS, GYRO_GOOD, airspeed_came, refuse, screen
 from estimator.compiler.jit import kernel
 from estimator.ins_ekf.flight import (
     CUT_FORCE,
@@ -89,18 +89,17 @@ from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Array, Column, Imu
 from estimator.params.ins_ekf import FLOORS, InsEkfParams
 from estimator.rotation import level, renormalise
 
-LONGEST_STAMPED_S = 2.0  # a stamp further back is of another clock
-LEARNT_SHARE = 0.5  # a sigma below so much of what it was at the start means that something was learnt
-SHRINK_S = 0.005  # the horizon comes nearer by no more than this from fix to fix
-COAST_S = 0.25  # how long the last rate stands in for a broken gyro
-WIND_KNOWN_M_S = 1.5  # sigma, both axes together, of a wind worth telling
+LONGEST_STAMPED_S = 2.0  # an older stamp comes from another clock
+LEARNT_SHARE = 0.5  # a latency counts as learnt once its sigma is below this share of the initial one
+SHRINK_S = 0.005  # most by which the horizon approaches the present from fix to fix
+WIND_KNOWN_M_S = 1.5  # sigma, both axes together, below which the wind is reported
 GOOD_HEADING_RAD, GOOD_TILT_RAD = math.radians(15.0), math.radians(5.0)  # sigmas of a good attitude
 
 _FILTER = (
     Column("R_filter_eb", (3, 3), "attitude at the filter's time"),
     Column("v_e_m_s", (3,), "velocity over the ground, at the filter's time"),
-    Column("gyro_gain", (3,), "what the gyro reads too much, per unit of rate"),
-    Column("force_bias_b_m_s2", (3,), "what the accelerometer reads too much"),
+    Column("gyro_gain", (3,), "relative gain error of each gyro axis"),
+    Column("force_bias_b_m_s2", (3,), "accelerometer bias"),
     Column("lagged_v_e_m_s", (3,), "velocity inside the receiver, behind its filter"),
     Column("lagged_rate_m_s2", (3,), "how fast that changes"),
     Column("filter_clock_s", (), "the filter's time"),
@@ -114,46 +113,46 @@ _FILTER = (
     Column("lag_keep", (), "weight of the old output of the receiver's filter"),
     Column("lag_end", (), "weight of its newest input"),
     Column("expected", (), "variance of the last innovation"),
-    Column("surprise", (), "square of a fix's innovation over its variance, mean of late"),
-    Column("latency_s", (), "latency of a fix without a stamp, as far as it is learnt"),
-    Column("longest_latency_s", (), "the longest that is learnt"),
+    Column("surprise", (), "square of a fix's innovation over its variance, recent mean"),
+    Column("latency_s", (), "estimated latency of a fix without a stamp"),
+    Column("longest_latency_s", (), "upper limit of that"),
 )
 _AROUND = (
-    Column("delay_s", (), "how far back the filter lives"),
-    Column("seeded", (), "1 once the velocity has a start", integer=True),
+    Column("delay_s", (), "how far the filter is behind the present"),
+    Column("seeded", (), "1 once the velocity is initialised", integer=True),
     Column("aligned", (), "1 once the heading was found", integer=True),
-    Column("fix_age_s", (), "time since a fix was believed"),
-    Column("refusing_s", (), "time since the first of the fixes refused of late, 0 where the last was believed"),
+    Column("fix_age_s", (), "time since a fix was accepted"),
+    Column("refusing_s", (), "time since the first of the recent rejected fixes, 0 if the last was accepted"),
     Column("mag_started", (), "1 once an uncalibrated magnetometer gave a first heading", integer=True),
-    Column("unstamped", (), "how many fixes without a stamp came", integer=True),
+    Column("unstamped", (), "number of fixes without a stamp", integer=True),
     Column("pseudo_s", (), "time since the last pseudo-measurements"),
     Column("air_age_s", (), "infinite before the first airspeed, else 0"),
-    Column("cruise_m_s", (), "airspeed of late, for when the GPS falls silent"),
-    Column("cruise_sigma_m_s", (), "how well it is known"),
-    Column("lift_e_m_s2", (), "mean downward specific force of late: minus gravity, in any flight"),
+    Column("cruise_m_s", (), "recent airspeed, for use without GPS"),
+    Column("cruise_sigma_m_s", (), "sigma of that"),
+    Column("lift_e_m_s2", (), "recent mean of the downward specific force: minus gravity in any flight"),
     Column("nose_at_start", (2,), "horizontal nose where the filter started"),
     Column("oldest", (), "index of the oldest waiting sample", integer=True),
-    Column("waiting", (), "how many wait", integer=True),
+    Column("waiting", (), "number of waiting samples", integer=True),
     Column("w_clock_s", (SIZE,), "when each waiting sample ended"),
-    Column("w_dt_s", (SIZE,), "the time it accounts for"),
-    Column("w_gyro", (SIZE, 3), "its rate as read"),
-    Column("w_force", (SIZE, 3), "its specific force as read"),
-    Column("w_bits", (SIZE,), "what is to be known of it", integer=True),
+    Column("w_dt_s", (SIZE,), "time that it covers"),
+    Column("w_gyro", (SIZE, 3), "its gyro reading"),
+    Column("w_force", (SIZE, 3), "its accelerometer reading"),
+    Column("w_bits", (SIZE,), "what is clipped and what lies beside it", integer=True),
     Column("w_fix_v_e_m_s", (SIZE, 3), "velocity of the fix that was true in it"),
-    Column("w_fix_early_s", (SIZE,), "how long before its end"),
-    Column("w_fix_latency_s", (SIZE,), "latency by which that place was chosen"),
+    Column("w_fix_early_s", (SIZE,), "time from that to its end"),
+    Column("w_fix_latency_s", (SIZE,), "latency with which it was placed"),
     Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
     Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
 )
 STATE_DTYPE = state_dtype(InsEkfParams, *FIELD, *_FILTER, *_AROUND)
 
 
-# What waits
+# Waiting samples
 
 
 @kernel
 def push(row, s, good):  # type: ignore[no-untyped-def]
-    """Let the sample of `row` wait; a broken part of it is replaced by what is believed, and marked."""
+    """Append the sample of `row`; a rejected part is replaced by its estimate and marked."""
     if s.waiting == SIZE:
         advance_filter(s)
     i = (s.oldest + s.waiting) % SIZE
@@ -189,7 +188,7 @@ def attach_fix(row, s):  # type: ignore[no-untyped-def]
         refuse(s, GPS)
         return
     bits, late_s = HAS_FIX, s.latency_s
-    if s.gps_stamped and 0.0 <= row.t_s - row.gps_t_s <= LONGEST_STAMPED_S:  # written so that NaN is no stamp
+    if s.gps_stamped and 0.0 <= row.t_s - row.gps_t_s <= LONGEST_STAMPED_S:  # NaN is no stamp
         bits, late_s = HAS_FIX | STAMPED, row.t_s - row.gps_t_s
     else:
         s.unstamped += 1
@@ -234,7 +233,7 @@ def turn_on(s, i):  # type: ignore[no-untyped-def]
 
 @kernel
 def reach_present(s):  # type: ignore[no-untyped-def]
-    """The filter's attitude turned on by all samples that wait."""
+    """Set the present attitude: the filter's, turned by all waiting samples."""
     for i in range(3):
         for j in range(3):
             s.R_eb[i, j] = s.R_filter_eb[i, j]
@@ -267,7 +266,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
 
 @kernel
 def health(s, rejecting):  # type: ignore[no-untyped-def]
-    """What the filter says of itself."""
+    """The `Health` from the filter's own sigmas."""
     if not s.aligned:
         return STARTING
     tilt = s.P[TILT, TILT] + s.P[TILT + 1, TILT + 1]
@@ -283,7 +282,7 @@ def _replay(rows, state, estimates):  # type: ignore[no-untyped-def]
 
 
 class InsEkf(Compiled[InsEkfParams]):
-    """An inertial navigation filter that models the sensors and learns the wind; see the module.
+    """Error-state Kalman filter with 21 states that models the sensors and learns the wind.
 
     Started at power-up it assumes rest; started in the air it takes velocity and heading from the first fix.
     """
@@ -319,7 +318,7 @@ class InsEkf(Compiled[InsEkfParams]):
         return {"gps_latency_s": float(s["latency_s"])}
 
     def sigma(self) -> dict[str, Array]:
-        """Standard deviations that the filter believes in, at its own time: a delay behind the present.
+        """Standard deviations of the state, at the filter's time, one delay behind the present.
 
         Returns
         -------

@@ -10,13 +10,13 @@ GAIN     3     relative gain error of each gyro axis
 FORCE    3     accelerometer bias, body axes
 LAG      3     velocity inside the receiver, behind its first-order filter, earth axes
 WIND     2     north and east velocity of the air
-LATENCY  1     from the moment a fix is true to its arrival
+LATENCY  1     time from a fix being true to its arrival
 =======  ====  =====================================================================================
 
-An attitude error in earth axes keeps the heading, which may be quite unknown, apart from the tilt, which is not.
+An attitude error in earth axes separates the heading, which may be unknown, from the tilt, which is known.
 
 The covariance ``P`` is advanced as ``F (F P)^T`` by row operations alone: F differs from the identity in nine rows.
-Every measurement is a scalar and is taken in by Joseph's form, in which round-off cannot make P indefinite.
+Every measurement is a scalar and is fused in Joseph's form, in which round-off cannot make P indefinite.
 
 References
 ----------
@@ -28,25 +28,25 @@ R. S. Bucy and P. D. Joseph, "Filtering for Stochastic Processes with Applicatio
 
 import numpy as np
 
-from estimator.blocks.kernels import clip
+from estimator.blocks.kernels import clip, dot
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2
 
 N = 21
 TILT, VEL, BIAS, GAIN, FORCE, LAG, WIND_NE, LATENCY = 0, 3, 6, 9, 12, 15, 18, 20
 
-FULL = 0.97  # share of the full scale from which on a reading may be cut off
-CUT_RAD_S, CUT_M_S2, CUT_S = 1.0, 10.0, 0.1  # sigma and correlation time of what is then missing
-CROSS_S = 2.0  # how long an error that turns with the body keeps its direction: about a radian of turn
-FORCE_GAIN_SHARE = 0.5  # relative gain error of an accelerometer, of its bias sigma in g: pulling, it errs by more
-LATENCY_WALK_S_SQRT_S = 0.001  # a latency that is learnt may change: sigma after one second
-BIAS_LIMIT = 6.0  # no bias, gain or wind is believed beyond this many initial sigmas
+FULL = 0.97  # share of the full scale above which a reading may be clipped
+CUT_RAD_S, CUT_M_S2, CUT_S = 1.0, 10.0, 0.1  # sigma and correlation time of the missing part
+CROSS_S = 2.0  # correlation time of an error that turns with the body: about a radian of turn
+FORCE_GAIN_SHARE = 0.5  # relative gain error of an accelerometer per bias sigma in g: at high load it errs by more
+LATENCY_WALK_S_SQRT_S = 0.001  # random walk of the latency, sigma after one second
+BIAS_LIMIT = 6.0  # limit of bias, gain and wind, in initial sigmas
 
 
 @kernel
 def rodrigues(squared):  # type: ignore[no-untyped-def]
     """``sin(a) / a`` and ``(1 - cos(a)) / a^2`` of an angle whose square is given."""
-    if squared < 0.01:  # the series is good to 1e-13 here, and costs no sine
+    if squared < 0.01:  # the series is accurate to 1e-13 here, without a sine
         a = 1.0 - squared / 6.0 * (1.0 - squared / 20.0 * (1.0 - squared / 42.0))
         b = 0.5 - squared / 24.0 * (1.0 - squared / 30.0 * (1.0 - squared / 56.0))
         return a, b
@@ -80,13 +80,13 @@ def turn_in_earth(R, x, y, z):  # type: ignore[no-untyped-def]
 
 @kernel
 def true_rate(gyro, s, i):  # type: ignore[no-untyped-def]
-    """Rate about body axis `i` behind a reading: gyro = (1 + gain) rate + bias."""
+    """Rate about body axis `i` from a reading: gyro = (1 + gain) rate + bias."""
     return (gyro[i] - s.gyro_bias_b_rad_s[i]) / (1.0 + s.gyro_gain[i])
 
 
 @kernel
 def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
-    """Move attitude, velocity and the receiver's filter by one inertial sample; keep what F needs.
+    """Move attitude, velocity and the receiver's filter by one inertial sample; store what F needs.
 
     gyro, force : shape (3,), the readings, means over `dt` s
     """
@@ -118,7 +118,7 @@ def advance_state(s, gyro, force, dt):  # type: ignore[no-untyped-def]
 
 @kernel
 def filter_weights(time_constant_s, dt):  # type: ignore[no-untyped-def]
-    """Weights of the old output and of the newest input of a first-order filter; a time constant of 0 is none."""
+    """Weights of the old output and the newest input of a first-order filter; a time constant of 0 is no filter."""
     if time_constant_s <= 0.0:
         return 0.0, 1.0
     step = dt / time_constant_s
@@ -146,11 +146,8 @@ def apply_transition(P, s, dt):  # type: ignore[no-untyped-def]
         for j in range(N):
             P[VEL + i, j] -= r0 * P[FORCE, j] + r1 * P[FORCE + 1, j] + r2 * P[FORCE + 2, j]
     for i in range(3):  # d(tilt)/dt = -R (bias + rate gain) / (1 + gain)
-        b0, b1, b2 = (
-            dt * R[i, 0] / (1.0 + s.gyro_gain[0]),
-            dt * R[i, 1] / (1.0 + s.gyro_gain[1]),
-            dt * R[i, 2] / (1.0 + s.gyro_gain[2]),
-        )
+        gain, r = s.gyro_gain, R[i]
+        b0, b1, b2 = dt * r[0] / (1.0 + gain[0]), dt * r[1] / (1.0 + gain[1]), dt * r[2] / (1.0 + gain[2])
         g0, g1, g2 = b0 * w[0], b1 * w[1], b2 * w[2]
         for j in range(N):
             P[TILT + i, j] -= b0 * P[BIAS, j] + b1 * P[BIAS + 1, j] + b2 * P[BIAS + 2, j]
@@ -178,7 +175,7 @@ def symmetrise(P):  # type: ignore[no-untyped-def]
 
 @kernel
 def grow(P, first, count, variance, limit):  # type: ignore[no-untyped-def]
-    """Add `variance` to states that are not more uncertain than `limit` already."""
+    """Add `variance` to states whose variance is below `limit`."""
     for i in range(first, first + count):
         if P[i, i] < limit:
             P[i, i] += variance
@@ -186,7 +183,7 @@ def grow(P, first, count, variance, limit):  # type: ignore[no-untyped-def]
 
 @kernel
 def add_process_noise(s, dt, gyro_cut, force_cut):  # type: ignore[no-untyped-def]
-    """``P <- P + Q`` for one sample; `gyro_cut`, `force_cut` where a reading is cut off or missing.
+    """``P <- P + Q`` for one sample; `gyro_cut`, `force_cut` where a reading is clipped or missing.
 
     A one-sided density d gives a sample of dt s the variance d^2 / (2 dt), and its integral d^2 dt / 2.
     """
@@ -222,12 +219,12 @@ def predict(s, gyro, force, dt, gyro_cut, force_cut):  # type: ignore[no-untyped
 
 @kernel
 def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
-    """Take in a scalar measurement whose gradient is ``s.h``, and correct the state.
+    """Fuse a scalar measurement whose gradient is ``s.h``.
 
     Returns
     -------
-    bool    False where the innovation is more than `gate` of its own sigmas, and nothing was changed; the variance
-            of the innovation is left in ``s.expected``
+    bool    False if the innovation is beyond `gate` of its sigmas, and nothing was changed; the variance of the
+            innovation is in ``s.expected``
     """
     P, h, gain, left = s.P, s.h, s.gain, s.left
     expected = variance
@@ -240,7 +237,7 @@ def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
     for i in range(N):
         expected += h[i] * left[i]
     s.expected = expected
-    if not innovation * innovation <= gate * gate * expected:  # written so that NaN is refused
+    if not innovation * innovation <= gate * gate * expected:  # NaN is rejected
         return False
     for i in range(N):
         gain[i] = left[i] / expected
@@ -262,7 +259,7 @@ def fuse(s, innovation, variance, gate):  # type: ignore[no-untyped-def]
 
 @kernel
 def correct_state(s, innovation):  # type: ignore[no-untyped-def]
-    """Move gain times innovation from the error state into the estimate (Sola 6.2)."""
+    """Add gain times innovation to the estimate (Sola 6.2)."""
     k = s.gain
     turn_in_earth(s.R_filter_eb, k[0] * innovation, k[1] * innovation, k[2] * innovation)
     for i in range(3):
@@ -280,7 +277,7 @@ def correct_state(s, innovation):  # type: ignore[no-untyped-def]
 
 @kernel
 def within(x, sigma):  # type: ignore[no-untyped-def]
-    """`x` limited to what an initial `sigma` lets believe."""
+    """`x` limited to `BIAS_LIMIT` initial sigmas."""
     return clip(x, -BIAS_LIMIT * sigma, BIAS_LIMIT * sigma)
 
 
@@ -325,9 +322,7 @@ def magnetic_course(s, m):  # type: ignore[no-untyped-def]
     """Direction of the measured field `m`, shape (3,), over the ground, rad, and its gradient in ``s.h``."""
     R, h = s.R_filter_eb, s.h
     no_gradient(h)
-    x = R[0, 0] * m[0] + R[0, 1] * m[1] + R[0, 2] * m[2]
-    y = R[1, 0] * m[0] + R[1, 1] * m[1] + R[1, 2] * m[2]
-    z = R[2, 0] * m[0] + R[2, 1] * m[1] + R[2, 2] * m[2]
+    x, y, z = dot(R[0], m), dot(R[1], m), dot(R[2], m)
     squared = max(x * x + y * y, 1e-12)
     h[TILT], h[TILT + 1], h[TILT + 2] = -z * x / squared, -z * y / squared, 1.0
     return np.arctan2(y, x)

@@ -1,4 +1,4 @@
-"""Gains of the drift controller from a time of recovery, by the linearised loop.
+"""Gains of the drift controller from a recovery time, by the linearised loop.
 
 "The practical realities of the wind and gyro saturation favor using weights and gains that are large enough to recover
 in about 10 seconds. In the feedback loop, the DCM algorithm is a nonlinear integrator. Therefore, you can select the
@@ -35,7 +35,7 @@ def eigenvalues(weight: float, k_p: float, k_i: float) -> tuple[complex, complex
 
 
 def error_after(t_s: ArrayLike, weight: float, k_p: float, k_i: float) -> Array:
-    """What is left at `t_s` of an error of one at the time zero, by the linearised loop."""
+    """Remainder at `t_s` of a unit error at time zero, by the linearised loop."""
     t = np.asarray(t_s, np.float64)
     slow, fast = eigenvalues(weight, k_p, k_i)
     if abs(fast - slow) < 1e-6 * abs(fast):  # critical damping: the limit of the quotient
@@ -44,7 +44,7 @@ def error_after(t_s: ArrayLike, weight: float, k_p: float, k_i: float) -> Array:
 
 
 def recovery_time_s(weight: float, k_p: float, k_i: float, remaining: float = 0.1) -> float:
-    """Time after which no more than the part `remaining` of a disturbance is left, and stays so; inf if never."""
+    """Time after which no more than the share `remaining` of a disturbance is left for good; inf if never."""
     if k_p * weight <= 0.0:
         return math.inf
     t = np.linspace(0.0, _LATEST / (k_p * weight), _STEPS)
@@ -71,19 +71,19 @@ def recommended_gains(
 ) -> PremerlaniParams:
     """Weights and gains with which the estimate recovers in `recovery_s`.
 
-    The roll-pitch loop fixes K_I; the yaw loop shares it, and its weight alone makes it quicker.  Where the lag of
-    the receiver is left in the yaw loop (``rotate_history`` off), that weight is held down so that the loop keeps a
-    phase margin of 60 degrees: K_P W_Y (filter + latency) at most 30 degrees in radians.
+    The roll-pitch loop determines K_I; the yaw loop shares it and is faster by its weight alone.  If the lag of the
+    receiver is in the yaw loop (``rotate_history`` off), that weight is limited so that the loop keeps a phase margin
+    of 60 degrees: K_P W_Y (filter + latency) at most 30 degrees in radians.
 
     Parameters
     ----------
     recovery_s : until no more than `remaining` of a tilt is left
     yaw_recovery_s : the same for the heading; a quarter of `recovery_s` by default ("it is best to use a large weight
         for the yaw drift correction")
-    remaining : part of the disturbance, 0..1
-    damping : of the roll-pitch loop.  Large: little overshoot and little noise in the learnt offset, which then
-        takes its time; from 1.4 on, the overshoot stays below a tenth
-    base : where all other parameters come from, K_P and the lag of the receiver too; the defaults by default
+    remaining : share of the disturbance, 0..1
+    damping : of the roll-pitch loop.  Higher: less overshoot and less noise in the learnt offset, learnt more slowly;
+        from 1.4 on, the overshoot stays below a tenth
+    base : source of all other parameters, K_P and the lag of the receiver too; the defaults if None
 
     Returns
     -------
@@ -91,7 +91,7 @@ def recommended_gains(
 
     Raises
     ------
-    ValueError    a time, part or damping that cannot be
+    ValueError    a time, share or damping out of range
     """
     base = base or PremerlaniParams()
     yaw_s = recovery_s / 4.0 if yaw_recovery_s is None else yaw_recovery_s
@@ -104,10 +104,10 @@ def recommended_gains(
     ):
         if not 0.0 < value < most:
             raise ValueError(f"{name} is {value}; it must be more than 0 and less than {most}")
-    # With K_P = 1 and a damping, time scales with 1 / W: the loop of weight one tells all others.
+    # With K_P = 1 and a given damping, time scales with 1 / W: one loop of weight one is enough.
     unit_s = recovery_time_s(1.0, 1.0, 0.25 / damping**2, remaining)
     if not math.isfinite(unit_s):
-        raise ValueError(f"damping is {damping}; what is left then fades too slowly to {remaining}: 1 to 3 is usual")
+        raise ValueError(f"damping is {damping}; the error then fades too slowly to {remaining}; 1 to 3 is usual")
     w_rp = unit_s / (recovery_s * base.k_p)
     k_i = w_rp * base.k_p**2 * 0.25 / damping**2
     w_y = _weight(yaw_s, base.k_p, k_i, remaining)

@@ -12,7 +12,7 @@ YawReference = Literal["course", "nose", "magnetometer"]
 
 @dataclass(frozen=True, slots=True)
 class GpsVelocityParams(MagnetometerParams):
-    """Gains and options; the default receiver is what `estimator.instruments` assumes where nothing is known.
+    """Gains and options; the default receiver is what `estimator.instruments` assumes.
 
     yaw_reference : choice  what the heading converges to: course, nose or magnetometer
     w_rp : -  weight of the roll-pitch error (Eqn 28 of the paper)

@@ -31,7 +31,7 @@ FLOORS: Mapping[str, float] = {
 
 @dataclass(frozen=True, slots=True)
 class InsEkfParams(MagnetometerParams):
-    """What the filter assumes about its sensors and the air; defaults as in `estimator.instruments`, nothing known.
+    """What the filter assumes about its sensors and the air; defaults as `estimator.instruments` assumes.
 
     A sigma that is too small makes the filter overconfident and slow to recover; one that is too large makes it noisy
     and slow to learn.  Sigmas of sensors may be zero and full scales infinite: see `FLOORS`.

@@ -14,7 +14,7 @@ LEAST_CLIP_M_S2 = 1.5 * G_M_S2  # no accelerometer that flies has a smaller full
 class PremerlaniParams(Params):
     """Gains and options; `estimator.params.gains.recommended_gains` derives gains from a recovery time.
 
-    The default receiver is what `estimator.instruments` assumes where nothing is known.
+    The default receiver is what `estimator.instruments` assumes.
 
     w_rp : -  weight of the roll-pitch correction (Eqn 28)
         higher: tilt errors fade sooner, but unmodelled acceleration tilts the estimate; lower: smoother, slower

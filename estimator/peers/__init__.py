@@ -1,1 +1,1 @@
-"""Attitude estimators of other packages, flown for comparison: Madgwick, Mahony, VQF and imufusion."""
+"""Attitude estimators from other packages, for comparison: Madgwick, Mahony, VQF and imufusion."""

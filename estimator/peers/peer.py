@@ -1,4 +1,4 @@
-"""What the adapters to estimators of others share: screening, calibration, axes; see `estimator.peers`."""
+"""Base classes of the adapters to other packages: screening, calibration, axes; see `estimator.peers.peers`."""
 
 import importlib
 import math
@@ -37,20 +37,20 @@ from estimator.params.peers import PeerParams
 from estimator.params.shared import RANGES
 from estimator.rotation import heading_rad
 
-# In this order, because numba takes a record for a subtype of every one that begins like it, and says so aloud.
+# In this order, because numba warns about records that begin with all columns of another.
 STATE_DTYPE = dtype_of(
     (
         *SCREEN,
         *BELIEF,
         *FIELD_COLUMNS,
         Column("force_b_m_s2", (3,), "the accelerometer's last sample"),
-        Column("course_rad", (), "the last course that could be believed"),
-        Column("course_age_s", (), "time since it came"),
+        Column("course_rad", (), "the last plausible course"),
+        Column("course_age_s", (), "time since it arrived"),
     )
 )
-FIELD, COURSE = 8, 16  # bits beside those of `screen`: a magnetometer's sample arrived, there is a fresh course
-FIX_LIFE_S = 2.0  # an older course corrects nothing any more
-MIN_SPEED_M_S = 3.0  # a slower ground speed has no course
+FIELD, COURSE = 8, 16  # bits besides those of `screen`: a magnetometer sample arrived, the course is fresh
+FIX_LIFE_S = 2.0  # an older course is not used
+MIN_SPEED_M_S = 3.0  # slowest ground speed with a course
 
 NORTH_EAST_DOWN, NORTH_WEST_UP = np.eye(3), np.diag([1.0, -1.0, -1.0])
 EAST_NORTH_UP = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # from north-east-down, and back
@@ -59,7 +59,7 @@ RIGHT_DOWN, LEFT_UP = np.ones(3), np.array([1.0, -1.0, -1.0])  # forward-left-up
 
 @kernel
 def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped-def]
-    """Judge row `k` and take what is believed of it into the state; returns the bits of what is there."""
+    """Screen row `k` and copy the accepted samples into the state; returns their bits."""
     row, s = rows[k], state[0]
     good = screen(row, s)
     if not good:
@@ -79,7 +79,7 @@ def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped
 
 
 def package(name: str) -> Any:
-    """The module `name`; ImportError in one line where it is not installed."""
+    """The module `name`; ImportError in one line if it is not installed."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
@@ -94,18 +94,18 @@ def to_quaternion(R: Array) -> Array:
 
 
 def _about_down(angle_rad: float) -> Array:
-    """Turns the earth axes of an attitude about the vertical, shape (3, 3): the nose to the right by `angle_rad`."""
+    """Rotation about the vertical, shape (3, 3), that turns the nose to the right by `angle_rad`."""
     c, z = math.cos(angle_rad), math.sin(angle_rad)
     return np.array([[c, -z, 0.0], [z, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @kernel
 def _take_quaternion(q, earth, body, declination_rad, state):  # type: ignore[no-untyped-def]
-    """Set the attitude from the package's quaternion in its own axes; False where that is no rotation."""
+    """Set the attitude from the package's quaternion in its own axes; False if it is not a rotation."""
     s = state[0]
     w, x, y, z = q[0], q[1], q[2], q[3]
     squared = w * w + x * x + y * y + z * z
-    if not 0.01 < squared < 100.0:  # NaN is not either
+    if not 0.01 < squared < 100.0:  # nor is NaN
         return False
     n = 2.0 / squared
     R = np.empty((3, 3))
@@ -113,7 +113,7 @@ def _take_quaternion(q, earth, body, declination_rad, state):  # type: ignore[no
     R[1, 0], R[1, 1], R[1, 2] = n * (x * y + w * z), 1.0 - n * (x * x + z * z), n * (y * z - w * x)
     R[2, 0], R[2, 1], R[2, 2] = n * (x * z - w * y), n * (y * z + w * x), 1.0 - n * (x * x + y * y)
     for j in range(3):
-        north = earth[0, 0] * R[0, j] + earth[1, 0] * R[1, j]  # the vertical stays the vertical
+        north = earth[0, 0] * R[0, j] + earth[1, 0] * R[1, j]  # the vertical stays
         east = earth[0, 1] * R[0, j] + earth[1, 1] * R[1, j]
         c, sine = np.cos(declination_rad), np.sin(declination_rad)
         s.R_eb[0, j] = (c * north - sine * east) * body[j]
@@ -126,7 +126,7 @@ NOTHING_LEARNT = np.zeros(3)
 
 
 class Heard(NamedTuple):
-    """What a package is given in one tick, in our units and its own body axes; None where nothing is believed.
+    """Input of a package in one tick, in our units and its own body axes; None if rejected or missing.
 
     gyro_rad_s : less the offset measured at power-up      course_rad : of the GPS, at most 2 s old
     """
@@ -139,22 +139,22 @@ class Heard(NamedTuple):
 
 
 class Peer:
-    """What the adapters share: screening, calibration, axes, the heading to start with.
+    """Base class of the adapters: screening, calibration, axes, initial heading.
 
-    A subclass brings `_start`, `_turn`, `_advance` and `_learnt`.
+    A subclass defines `_start`, `_turn`, `_advance` and `_learnt`.
     """
 
     heading_reference: HeadingReference = "nose"
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "magnetometer")
     _earth: ClassVar[Array] = NORTH_EAST_DOWN  # the package's earth axes from ours
     _body: ClassVar[Array] = RIGHT_DOWN  # its body components are ours times this
-    _finds_heading: ClassVar[bool] = False  # whether the package takes its first heading from the first field itself
+    _finds_heading: ClassVar[bool] = False  # whether the package itself takes its heading from the first field
 
     def __init__(self, params: PeerParams) -> None:
         self.params = params
         self._uses = ("magnetometer" in self.uses and bool(params.use_magnetometer), "gps" in self.uses)
         self._state = np.zeros(1, STATE_DTYPE)
-        # Views, because a field of a record takes microseconds to look up.
+        # Views: looking up a field of a record takes microseconds.
         (
             self._R_eb, self._omega_b_rad_s, self._bias_b_rad_s, self._force_b_m_s2, self._field_b_ut,
         ) = (
@@ -170,7 +170,7 @@ class Peer:
         self.reset()
 
     def reset(self, on_ground: ImuSample | None = None) -> None:
-        """Power up: gyro offset and tilt from the mean sample of something at rest; without, zero and level.
+        """Power up: gyro offset and tilt from a mean sample at rest; without one, zero and level.
 
         The heading is north until the first field, or course, sets it.
         """
@@ -197,7 +197,7 @@ class Peer:
                 self._bias_b_rad_s[:] = self._offset_b_rad_s + self._body * self._learnt()
                 if tells_heading:
                     self._align(tells_heading)
-            else:  # the package lost itself: it goes on from the attitude before
+            else:  # the package diverged: it restarts from the previous attitude
                 self._rejected += 1
                 self._start(self._theirs(self._R_eb), settled=True)
         return AttitudeEstimate(
@@ -210,17 +210,17 @@ class Peer:
 
     @property
     def rejected(self) -> int:
-        """Ticks in which something was not believed, since the reset."""
+        """Ticks since the reset in which something was rejected."""
         return int(self._rejected[0])
 
     @property
     def refused(self) -> dict[str, int]:
-        """Samples not believed since the reset, by the instrument that they are of."""
+        """Samples rejected since the reset, by instrument."""
         return refusals(self._state)
 
     @property
     def _declination_rad(self) -> float:
-        """Of the package's north from ours."""
+        """Declination of the package's north from ours."""
         return self.params.declination_rad if self._magnetic else 0.0
 
     def _theirs(self, R_eb: Array) -> Array:
@@ -228,7 +228,7 @@ class Peer:
         return to_quaternion(self._earth @ _about_down(-self._declination_rad) @ R_eb * self._body)
 
     def _align(self, by: int) -> None:
-        """Set the heading by the field that came, or by the course, and leave the tilt as it is."""
+        """Set the heading from the field or the course that arrived; the tilt stays."""
         if by & FIELD:
             self._aligned = self._magnetic = bool(
                 turn_to_north(self._R_eb, self._field_b_ut, self.params.declination_rad)
@@ -241,7 +241,7 @@ class Peer:
 
     def _heard(self, good: int) -> Heard:
         body = self._body
-        # The rate is less all the bias believed; what the package has learnt itself it takes off itself.
+        # omega_b is less the whole estimated bias; the package subtracts its own part itself.
         gyro_b_rad_s = self._omega_b_rad_s + (self._bias_b_rad_s - self._offset_b_rad_s)
         return Heard(
             body * gyro_b_rad_s,
@@ -252,11 +252,11 @@ class Peer:
         )
 
     def _start(self, q: Array, *, settled: bool) -> None:
-        """Start the package at the attitude `q` in its own axes, well known where `settled`."""
+        """Start the package at the attitude `q` in its own axes, accurate if `settled`."""
         raise NotImplementedError
 
     def _turn(self, q: Array) -> None:
-        """Set the package's attitude, and leave what it has learnt."""
+        """Set the package's attitude; its learnt state stays."""
         raise NotImplementedError
 
     def _advance(self, heard: Heard) -> Array:
@@ -264,7 +264,7 @@ class Peer:
         raise NotImplementedError
 
     def _learnt(self) -> Array:
-        """Gyro offset that the package has found, beyond that of the calibration, shape (3,), its body axes."""
+        """Gyro offset learnt by the package, beyond the calibration, shape (3,), its body axes."""
         return NOTHING_LEARNT
 
 
@@ -276,7 +276,7 @@ class Keeping(Peer):
         return (self._state.copy(), self._offset_b_rad_s.copy(), self._magnetic, self._aligned, self._kept())
 
     def restore(self, snapshot: tuple[Any, ...]) -> None:
-        """Go on from a `snapshot`."""
+        """Continue from a `snapshot`."""
         state, offset, self._magnetic, self._aligned, kept = snapshot
         self._state[:], self._offset_b_rad_s = state, offset.copy()
         self._keep(kept)

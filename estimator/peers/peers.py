@@ -1,8 +1,8 @@
-"""Estimators that others have published, behind our interface: to be flown beside ours.
+"""Published estimators from other packages behind our interface, for comparison with ours.
 
-They come with the optional extra ``pip install "wingslevel[peers]"``.  An adapter screens the samples as every
-estimator here does, takes off the gyro offset measured at power-up, hands over what the package can use in the axes
-and units that its manual asks for, and turns the answer back.  It adds no correction of its own.
+They need the optional extra ``pip install "wingslevel[peers]"``.  An adapter screens the samples like every estimator
+here, subtracts the gyro offset measured at power-up, converts to the axes and units of the package, and converts the
+result back.  It adds no correction of its own.
 
 =================  =====================================  ===========================  ==============================
 name               package                                earth axes, body axes        also takes
@@ -14,25 +14,24 @@ peer_imufusion     imufusion, `update_external_heading`   north-east-down       
 peer_imufusion_9d  imufusion, `update`                    north-east-down              magnetometer, where fitted
 =================  =====================================  ===========================  ==============================
 
-None of them knows of centrifugal acceleration, of speed, or of wind.  Without a magnetometer the heading of the
-first three is that of the gyros.
+None of them models centrifugal acceleration, speed or wind.  Without a magnetometer the heading of the first three is
+that of the gyros.
 
-All begin with the heading of the first field that can be believed, or of the first course: their corrections would take
-minutes to find it from north.  VQF takes the whole of the first field that it is given itself.
+All start with the heading of the first plausible field, or of the first course: from north their corrections would take
+minutes.  VQF does this itself with its first field.
 
 Peculiarities of the packages
 -----------------------------
-*ahrs 0.4* returns the attitude uncorrected where the gyro reads exactly zero on all three axes.
+*ahrs 0.4* returns the attitude uncorrected if the gyro reads exactly zero on all three axes.
 
-*imufusion 1.3* accepts ``AhrsSettings(convention=...)`` and ignores it; set as an attribute it counts.  Its external
-heading is spread over a body that rolls and does not pitch: at the pitch theta it settles where
-``tan(yaw) = tan(heading) / cos(theta)``.  ``update_no_magnetometer`` sets the heading back to zero at every call of its
-first 3 s; ``update`` with a field of zero is the same without that.  It computes in single precision, and its state can
-neither be read nor set: these two have no `snapshot`.
+*imufusion 1.3* ignores ``AhrsSettings(convention=...)``; the attribute works.  Its external heading assumes a body that
+rolls and does not pitch: at the pitch theta it settles where ``tan(yaw) = tan(heading) / cos(theta)``.
+``update_no_magnetometer`` resets the heading to zero at every call of its first 3 s; ``update`` with a zero field is
+the same without that.  It computes in single precision, and its state can neither be read nor set: no `snapshot`.
 
-*vqf 2.1* is told one sample interval, and one of the magnetometer, at its construction: those of the first sample,
-and between the first two of the magnetometer.  Where samples were lost the one that arrived is given as often as it
-stands for; where the interval jitters the rate is scaled, so that the angle is right.
+*vqf 2.1* takes one sample interval, and one of the magnetometer, at construction: those of the first sample, and
+between the first two of the magnetometer.  A sample after lost ones is repeated to cover them; if the
+interval jitters the rate is scaled, so that the angle is right.
 
 References
 ----------
@@ -52,15 +51,15 @@ from estimator.params.peers import ImufusionParams, MadgwickParams, MahonyParams
 from estimator.peers.peer import EAST_NORTH_UP, LEFT_UP, NORTH_WEST_UP, Heard, Keeping, Peer, package
 
 NO_FORCE, NO_FIELD = np.zeros(3), np.zeros(3)
-SHORTEST_S = 5e-4  # sample interval that a package is told at least
+SHORTEST_S = 5e-4  # shortest sample interval that a package is given
 
 
 class _Ahrs(Keeping):
-    """The two of the package ahrs: the caller holds the quaternion; MARG where a field arrived, else IMU."""
+    """The two of the package ahrs: the caller holds the quaternion; MARG if a field arrived, else IMU."""
 
     _body = LEFT_UP
 
-    def _start(self, q: Array, *, settled: bool) -> None:  # noqa: ARG002 - they know no start
+    def _start(self, q: Array, *, settled: bool) -> None:  # noqa: ARG002 - they have no start-up
         self._q = q
         self._make()
 
@@ -71,7 +70,7 @@ class _Ahrs(Keeping):
         raise NotImplementedError
 
     def _advance(self, heard: Heard) -> Array:
-        # No force at all is what they take for "no accelerometer": they integrate then.
+        # Zero force means "no accelerometer" to them: they integrate then.
         force = NO_FORCE if heard.force_m_s2 is None else heard.force_m_s2
         self._magnetic |= heard.field_ut is not None
         self._q = np.array(self._step(heard.gyro_rad_s, force, heard.field_ut, heard.dt_s), np.float64)
@@ -136,7 +135,7 @@ class Mahony(_Ahrs):
 
 
 class Vqf(Keeping):
-    """VQF of Laidig and Seel, from the package vqf: 6D, and 9D once a magnetometer has been heard twice."""
+    """VQF of Laidig and Seel, from the package vqf: 6D, and 9D from the second magnetometer sample on."""
 
     _earth, _body = EAST_NORTH_UP, LEFT_UP
     _finds_heading = True
@@ -146,15 +145,15 @@ class Vqf(Keeping):
         self._vqf = package("vqf")
         super().__init__(params or VqfParams())
 
-    def _start(self, q: Array, *, settled: bool) -> None:  # noqa: ARG002 - it averages its first seconds by itself
-        self._filter: Any = None  # its interval is not known before the first sample
+    def _start(self, q: Array, *, settled: bool) -> None:  # noqa: ARG002 - it averages its first seconds itself
+        self._filter: Any = None  # its interval is unknown before the first sample
         self._q = q
         self._intervals_s = (0.0, 0.0)  # of gyro and accelerometer, of the magnetometer
         self._clock_s, self._field_at_s = 0.0, -1.0
         self._magnetic = False
 
     def _make(self, imu_s: float, mag_s: float) -> None:
-        """A filter for these intervals, in the state of the one before."""
+        """A filter for these intervals, in the state of the previous one."""
         p, before = self.params, self._filter
         options = {"tauAcc": p.tau_acc_s, "tauMag": p.tau_mag_s}
         self._filter = self._vqf.VQF(imu_s, imu_s, mag_s or imu_s, **options)
@@ -177,7 +176,7 @@ class Vqf(Keeping):
         return np.asarray(self._filter.getQuat9D() if self._magnetic else self._filter.getQuat6D())
 
     def _take_field(self, field_ut: Array) -> None:
-        """Hand over the magnetometer's sample, from the second one on: then their interval is known."""
+        """Pass on the magnetometer's sample, from the second one on: then their interval is known."""
         imu_s, mag_s = self._intervals_s
         if not mag_s and self._field_at_s >= 0.0:
             self._make(imu_s, max(self._clock_s - self._field_at_s, imu_s))
@@ -213,9 +212,9 @@ class Imufusion(Peer):
         super().__init__(params or ImufusionParams())
 
     def _start(self, q: Array, *, settled: bool) -> None:
-        self._filter, self._told_interval = self._fusion.Ahrs(), False
+        self._filter, self._has_interval = self._fusion.Ahrs(), False
         if settled:
-            self._filter.skip_startup()  # else it pulls hard for its first seconds
+            self._filter.skip_startup()  # else it corrects hard for its first seconds
         self._filter.set_quaternion(q)
 
     def _turn(self, q: Array) -> None:
@@ -223,17 +222,17 @@ class Imufusion(Peer):
 
     def _set(self, sample_hz: float) -> None:
         p, settings = self.params, self._fusion.AhrsSettings()
-        settings.convention = self._fusion.CONVENTION_NED  # as a keyword it would be ignored
+        settings.convention = self._fusion.CONVENTION_NED  # as a keyword argument it is ignored
         settings.sample_rate, settings.gain = sample_hz, p.gain
         settings.gyroscope_range = p.gyroscope_range_deg_s
         settings.acceleration_rejection = p.acceleration_rejection_deg
         settings.magnetic_rejection = p.magnetic_rejection_deg
         settings.rejection_timeout = p.rejection_timeout_s
         self._filter.set_settings(settings)
-        self._told_interval = True
+        self._has_interval = True
 
     def _advance(self, heard: Heard) -> Array:
-        if not self._told_interval:
+        if not self._has_interval:
             self._set(1.0 / max(heard.dt_s, SHORTEST_S))
         self._filter.set_sample_period(heard.dt_s)
         force_g = NO_FORCE if heard.force_m_s2 is None else heard.force_m_s2 / G_M_S2  # NED: level is (0, 0, -1)

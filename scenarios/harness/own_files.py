@@ -1,4 +1,4 @@
-"""Modules in files of the user's own: estimators, autopilots and scenarios named as ``path/to/file.py``.
+"""Modules in the user's files: estimators, autopilots and scenarios named as ``path/to/file.py``.
 
 A file is run anew each time, so that flights share nothing.  Its module has the name under which it would be imported
 if that name is free; else, as for a second file of that name, one made of its path.  Compiled kernels are cached
@@ -25,7 +25,7 @@ _running: set[Path] = set()  # files whose code is being run
 
 
 class Library(NamedTuple):
-    """A shared library: its file, and what the names of its five functions begin with."""
+    """A shared library: its file, and the prefix of its five functions."""
 
     path: Path
     prefix: str = PREFIX
@@ -37,7 +37,7 @@ class Library(NamedTuple):
 
     @property
     def sha256(self) -> str:
-        """Of the bytes of the file, hexadecimal."""
+        """Hash of the bytes of the file, hexadecimal."""
         return hashlib.sha256(self.path.read_bytes()).hexdigest()
 
 
@@ -63,12 +63,12 @@ def module_of_file(path: Path, refuse: Callable[[str], Exception]) -> ModuleType
     with theirs(refuse, str(path)):
         imported = sys.modules.get(path.stem)
         if imported is not None and imported is not _run.get(path.stem) and _is_in(imported, path):
-            return imported  # by somebody's own import statement
+            return imported  # by an import statement
         return _executed(path)
 
 
 def also_import_from(folder: Path) -> None:
-    """Let modules in `folder` be imported, after all others: nothing of ours can be shadowed."""
+    """Let modules in `folder` be imported, after all others, so that they cannot hide installed packages."""
     if str(folder) not in sys.path:
         sys.path.append(str(folder))
 
@@ -95,7 +95,7 @@ def _executed(path: Path) -> ModuleType:
 
 
 def _is_free(path: Path) -> bool:
-    """Whether an import of the file's own name gives the file at `path`, or what was made of it here."""
+    """Whether an import by the file's own name gives the file at `path` or its module made here."""
     name = path.stem
     if not name.isidentifier() or (path.parent / "__init__.py").exists():
         return False

@@ -183,7 +183,7 @@ def page() -> str:
 def _table(cls: type, params: Any, users: list[str]) -> str:
     declared = _declared(params, cls)
     lines = [
-        f"**{', '.join(f'`{name}`' for name in users)}**\n",
+        f"**{'Shared by ' if len(users) > 4 else ''}{', '.join(f'`{name}`' for name in users)}**\n",
         "| parameter | default | unit | meaning | higher, or on | lower, or off |",
         "|-|-|-|-|-|-|",
     ]

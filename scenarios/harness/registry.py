@@ -80,7 +80,7 @@ def find(name: str) -> Scenario:
 
 
 def module_of_offer(name: str) -> str:
-    """Name of the module that the entry point `name` points to; empty where an installed package offers none such."""
+    """Name of the module that the entry point `name` points to; empty if no installed package offers it."""
     offers = {} if name in registered() else _offered()
     return offers[name].module if name in offers else ""
 
@@ -91,7 +91,7 @@ def _offered() -> dict[str, Offer]:
 
 
 def _can_be_loaded(name: str) -> bool:
-    """Whether a scenario of an installed package is there; one line says so where it is not."""
+    """Whether a scenario of an installed package can be loaded; prints one line if not."""
     try:
         find(name)
     except ValueError as problem:

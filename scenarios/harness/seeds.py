@@ -1,4 +1,4 @@
-"""Seeds as a person types them."""
+"""Lists of seeds from the command line."""
 
 import re
 
@@ -7,7 +7,7 @@ MOST_SEEDS = 10_000  # of one command
 
 
 def parse_seeds(text: str) -> list[int]:
-    """Seeds of what a person types: ``0-9``, ``3``, ``0,2,5-7``; each once, in that order.
+    """The seeds in a list such as ``0-9``, ``3`` or ``0,2,5-7``; each once, in that order.
 
     Raises
     ------

@@ -27,7 +27,7 @@ class FlightVerdict:
     """The verdict on one flight: which flight, its outcome, the results of its checks, and its metrics.
 
     rows : empty if nothing was recorded, because its process died or was stopped
-    metrics : numbers by name, see `metrics_of`; empty where there are no rows
+    metrics : numbers by name, see `metrics_of`; empty if there are no rows
     known : what the estimator was given, or has learnt, about its instruments, by name
     wall_s : wall-clock time; None if not measured.  It is ignored by ``==``
     """

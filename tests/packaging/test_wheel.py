@@ -106,3 +106,24 @@ def test_wheel_installed_lists_and_flies(installed: Path, tmp_path: Path) -> Non
     }
     manifest = json.loads((tmp_path / data["recording"] / "manifest.json").read_text(encoding="utf-8"))
     assert manifest["versions"]["wingslevel"] != "not installed"
+
+
+def test_wheel_installed_is_typed(installed: Path, tmp_path: Path) -> None:
+    """A user's script passes mypy --strict against the wheel, where each mistake in it is found; and it runs."""
+    script = tmp_path / "script.py"
+    script.write_text((ROOT / "tests" / "packaging" / "typed_script.py").read_text(encoding="utf-8"), encoding="utf-8")
+    python = str(installed / "python")
+    checked = call([sys.executable, "-m", "mypy", "--strict", "--python-executable", python, "script.py"], tmp_path)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    ran = call([python, "script.py"], tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    assert (ran.stdout, ran.stderr) == ("", "")
+
+
+def test_wheel_installed_loads_nothing_heavy(installed: Path, tmp_path: Path) -> None:
+    """Importing the public API loads the standard library alone, and the names of all packages are found."""
+    code = "import sys, wingslevel; print(*{name.partition('.')[0] for name in sys.modules})"
+    done = call([str(installed / "python"), "-c", code], tmp_path)
+    assert done.returncode == 0, done.stderr
+    heavy = {"numpy", "numba", "jsbsim", "rerun", "matplotlib", "pyarrow", "pydantic", "scipy", "pandas"}
+    assert not heavy & set(done.stdout.split())

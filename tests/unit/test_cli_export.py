@@ -93,7 +93,7 @@ def test_export_twice_replaces_with_the_same_bytes(here: Path) -> None:
     ("arguments", "message"),
     [
         (["export"], "name --nmea FILE, --ubx FILE, --csv FILE or several"),
-        (["export", "--nmea", "a", "--ubx", "./a"], "each needs a file of its own"),
+        (["export", "--nmea", "a", "--ubx", "./a"], "use separate files"),
         (["export", "nowhere", "--nmea", "a"], "no recording at"),
         (["export", "--nmea", "a", "--start", "monday"], "--start 'monday'"),
         (["export", "--nmea", "a", "--start", "1950-01-01"], "6 January 1980"),

@@ -97,10 +97,10 @@ def _root(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and stop.")] = False,
     quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print errors and how it went, no more; also after the command.")
+        bool, typer.Option("--quiet", "-q", help="Print only errors and the result; also after the command.")
     ] = False,
     traceback: Annotated[
-        bool, typer.Option("--traceback", help="Show the whole traceback where code of your own raises.")
+        bool, typer.Option("--traceback", help="Show the whole traceback if your own code raises.")
     ] = False,
 ) -> None:
     console.be_quiet(quiet)
@@ -141,7 +141,7 @@ def fly(
         int | None,
         typer.Option(
             metavar="N",
-            help="Another seed, another flight; the same seed, the same bits. [default: 0]",
+            help="Seed of the flight; the same seed gives the same bits. [default: 0]",
             parser=whole_in(-(10**18), 10**18),
         ),
     ] = None,
@@ -180,7 +180,7 @@ def check(
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
-    """The gate for CI: fly scenarios on many seeds, judge each flight and all of them pooled."""
+    """The gate for CI: fly scenarios on many seeds, judge each flight and all flights pooled."""
     from scenarios.harness.commands import check as command
 
     return command.run(
@@ -191,19 +191,19 @@ def check(
 
 @app.command()
 def agree(
-    first: Annotated[Path, typer.Argument(help="What check --json wrote.")],
-    second: Annotated[Path, typer.Argument(help="The same of another machine.")],
+    first: Annotated[Path, typer.Argument(help="A file written by check --json.")],
+    second: Annotated[Path, typer.Argument(help="The same from another machine.")],
     tolerance: Annotated[
         float,
         typer.Option(
             metavar="REL",
-            help="Relative; those of each unit keep their proportion to it. 0 demands equal values.",
+            help="Relative tolerance; those by unit scale with it. 0 requires equal values.",
             parser=number_in(0.0, 10.0, ""),
         ),
     ] = 0.05,
     report_only: Annotated[
         str,
-        typer.Option(metavar="NAME,...", help="Scenarios, or patterns, whose values are not judged; none for none."),
+        typer.Option(metavar="NAME,...", help="Scenarios or patterns whose values are not judged, or none."),
     ] = "faults",
     json_: JsonOption = None,
 ) -> int:
@@ -228,7 +228,7 @@ def compare(
     markdown: MarkdownOption = None,
     json_: JsonOption = None,
 ) -> int:
-    """Estimators side by side: each flies the scenario on the same seeds, through the same air and noise."""
+    """Compare estimators: each flies the scenario on the same seeds, in the same air and with the same noise."""
     from scenarios.harness.commands import compare as command
 
     return command.run(
@@ -266,7 +266,7 @@ def claims(
 
 @app.command()
 def replay(
-    log: Annotated[Path, typer.Argument(help="Recording of ours, .csv, .mat, .bin, .ulg, or reference vectors.")],
+    log: Annotated[Path, typer.Argument(help="A recording, .csv, .mat, .bin, .ulg, or reference vectors.")],
     estimator: LogEstimatorsOption = "premerlani",
     reference: ReferenceOption = None,
     columns: ColumnsOption = None,
@@ -276,7 +276,9 @@ def replay(
     calibration: CalibrationOption = None,
     airborne: Annotated[
         float,
-        typer.Option(metavar="M/S", help="Ground speed above which it flies.", parser=number_in(-1e6, 1e6, "m/s")),
+        typer.Option(
+            metavar="M/S", help="Ground speed above which it is airborne.", parser=number_in(-1e6, 1e6, "m/s")
+        ),
     ] = 5.0,
     settle: Annotated[
         float,
@@ -286,7 +288,7 @@ def replay(
     no_rerun: NoRerunOption = False,
     json_: JsonOption = None,
 ) -> int:
-    """Run estimators over a recorded log and score them against the attitude that it holds."""
+    """Run estimators over a recorded log and score them against the attitude in it."""
     from scenarios.harness.commands import replay as command
     from scenarios.harness.replay import Window
 
@@ -342,7 +344,7 @@ def sensors(
     picture: PictureOption = None,
     json_: JsonOption = None,
 ) -> None:
-    """List the sensors, or print the page of one: its data sheet, its Allan deviation, what it does to a signal."""
+    """List the sensors, or print the page of one: its data sheet, its Allan deviation, its effect on a signal."""
     from scenarios.harness.commands import sensor_names as command
 
     command.run(part, picture, json_)
@@ -356,14 +358,14 @@ def export(
     nmea: Annotated[Path | None, typer.Option(metavar="FILE", help="Write NMEA 0183: GGA, RMC and VTG.")] = None,
     ubx: Annotated[Path | None, typer.Option(metavar="FILE", help="Write UBX NAV-PVT.")] = None,
     csv: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write all of it as a text log, and its column map beside it.")
+        Path | None, typer.Option(metavar="FILE", help="Write all measurements as a text log with a column map.")
     ] = None,
     start: Annotated[
-        str | None, typer.Option(metavar="UTC", help="When the power came up. [default: 2026-07-02T12:00:00]")
+        str | None, typer.Option(metavar="UTC", help="Time of power-up. [default: 2026-07-02T12:00:00]")
     ] = None,
     json_: JsonOption = None,
 ) -> None:
-    """Write a recording for other programs: its GPS fixes as receiver messages, all of it as a text log."""
+    """Write a recording for other programs: GPS fixes as receiver messages, all measurements as a text log."""
     from scenarios.harness.commands import export as command
 
     command.run(flight, FLIGHTS, nmea, ubx, csv, start, json_)

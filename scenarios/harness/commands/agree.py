@@ -20,7 +20,7 @@ from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
 from sim.outside.wording import brief
 
-RELATIVE = 0.05  # of the larger of the two values, and besides
+RELATIVE = 0.05  # of the larger of the two values; `ABSOLUTE` is added
 ABSOLUTE = {"deg": 0.2, "m": 0.5, "s": 0.5, "deg/s": 0.02, "m/s": 0.1, "turns": 0.01}  # by unit
 COUNTED = ("", "flights", "waypoints")  # units that are counted, not measured: no tolerance
 SENSITIVE = ("faults",)  # scenarios whose values a last bit can double
@@ -67,7 +67,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """How two verdicts compare; `others` are disagreements that are no matter of a tolerance, a line each."""
+    """How two verdicts compare; `others` are disagreements not covered by a tolerance, one line each."""
 
     n_flights: int
     tolerance: float

@@ -1,6 +1,6 @@
 """The performance page as one picture: polar, power, trim, turns, and where the modes go with speed.
 
-Imported only when a picture is asked for: it brings matplotlib.
+Imported only to draw a picture, since it loads matplotlib.
 """
 
 import math

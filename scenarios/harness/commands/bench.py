@@ -44,7 +44,7 @@ _NS_PER_US = 1e3
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """What was measured.
+    """The measurements.
 
     bare_us, closed_us : per tick, least of the repeats           median_ratio : over the pairs
     stages_us : per tick, by stage, recording included            update_ns : the estimator's `update`, per call
@@ -68,25 +68,25 @@ class Speed:
 
     @property
     def rows(self) -> list[Row]:
-        """What is demanded, with its limit."""
-        demands = (
+        """The requirements, with their limits."""
+        requirements = (
             ("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
             (f"{self.estimator}: update()", "ns", self.update_ns, UPDATE_LIMIT_NS),
             (f"{self.estimator}: kernel", "ns", self.kernel_ns, KERNEL_LIMIT_NS),
         )
         return [
             Row(name, unit, value, "<=", limit, value <= limit)
-            for name, unit, value, limit in demands
+            for name, unit, value, limit in requirements
             if value is not None
         ]
 
     @property
     def passed(self) -> bool:
-        """Whether all of it is fast enough."""
+        """Whether all requirements are met."""
         return all(row.passed for row in self.rows)
 
     def to_json(self) -> dict[str, Any]:
-        """The figures by name, each with its unit in it."""
+        """The values by name; names include the unit."""
         return {
             "passed": self.passed,
             "closed_loop_ratio": self.ratio,
@@ -143,7 +143,7 @@ class Cruise:
         return (end_ns - begin_ns) / (last - first) / _NS_PER_US
 
     def whole(self, flight: Flight) -> None:
-        """Raise `NotTimed` if the flight ended early."""
+        """NotTimed if the flight did not reach its end."""
         if flight.outcome == Outcome.INTERRUPTED:
             raise KeyboardInterrupt
         if flight.outcome != Outcome.COMPLETED:
@@ -189,7 +189,7 @@ class Cruise:
 
 
 def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
-    """Measure with `estimator` aboard: `repeats` pairs of `seconds` of simulated flight.
+    """Measure with `estimator`: `repeats` pairs of `seconds` of simulated flight.
 
     Raises
     ------

@@ -48,7 +48,7 @@ from scenarios.harness.verdict import FlightVerdict, Verdict, judge
 from sim.log import Outcome
 
 TIMED_S = 4.0
-_UNKNOWN = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")  # of a class that does not say
+_UNKNOWN = ("gyro", "accelerometer", "gps", "magnetometer", "airspeed")  # for a class that does not say
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +75,10 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be flown: everything that it names is there.
+    """The flights of a comparison; all names in it have been checked.
 
-    named : how the scenario was named (a file may hold it)      changes, references, given : by the estimator's name
-    notes : what is set for some of the estimators alone, a line each
+    named : name or file of the scenario      changes, references, given : by the estimator's name
+    notes : parameters that only some of the estimators have, one line each
     """
 
     named: str
@@ -102,7 +102,7 @@ def prepare(scenario: str, estimators: Sequence[str], seeds: Sequence[int], chan
     for name, instead in (("estimator", "--estimators"), ("seed", "--seeds")):
         if name in changes:
             raise ValueError(f"--set {name}={changes[name]}: name what is to be flown with {instead}")
-    flown = find(scenario).config  # before anything is constructed, which may mean compiling for a while
+    flown = find(scenario).config  # before anything is constructed, since that may compile
     names = tuple(dict.fromkeys(estimators)) or tuple(name for name in ESTIMATORS if _can_be_loaded(name))
     shared, settings = split(changes, names, lambda name: is_field(name, flown, changes))
     of_each = shared_settings(names, settings)
@@ -123,7 +123,7 @@ def _unheard(prepared: Mapping[str, Prepared]) -> list[str]:
 
     Raises
     ------
-    ValueError      one line: one that none of them has, nor the autopilot
+    ValueError      one line: a property that neither an estimator nor the autopilot has
     """
     lines = []
     for setting, value in next(iter(prepared.values())).config.instruments.items():
@@ -179,7 +179,7 @@ def given(prepared: Prepared) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _Timing:
-    """What an update of one estimator costs, to be measured in a process of its own: it is anyone's code."""
+    """The cost of an update of one estimator, measured in a separate process."""
 
     scenario: str
     config: str  # as JSON
@@ -205,10 +205,10 @@ def _measured(scenario: str, config: str) -> tuple[NDArray[Any], Instruments]:
 
 
 def _costs(plan: Plan, failed: Container[str], workers: int, limit_s: float | None) -> dict[str, Cost]:
-    """What an update of each that did not fail costs, over the measurements of the first seconds of a flight."""
+    """Cost of an update of each estimator that did not fail, over the first seconds of a flight."""
     another = {"duration_s": TIMED_S, "estimator": "premerlani", "estimator_params": {}}
     config = plan.config.model_copy(update=another).model_dump_json()
-    # The oracle answers in a flight alone.
+    # The oracle works only in a flight.
     timed = [name for name in plan.names if name not in failed and name != "oracle"]
     tasks = [_Timing(plan.named, config, name) for name in timed]
     found = fly_each(tasks, workers, lambda _n, _total: None, limit_s=limit_s)

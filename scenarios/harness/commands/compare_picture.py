@@ -1,6 +1,6 @@
 """The comparison as one picture: how the errors go with time, how they are spread, and a line for each estimator.
 
-Imported only when a picture is asked for: it brings matplotlib.
+Imported only to draw a picture, since it loads matplotlib.
 """
 
 import math

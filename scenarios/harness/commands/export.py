@@ -2,7 +2,6 @@
 
 import gzip
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import partial
@@ -22,7 +21,7 @@ from sim.sensors.fitting import suite_params
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """What is to be written of the recording `flight`: the bytes for each file, by format.
+    """The export of the recording `flight`: the bytes for each file, by format.
 
     rows : of its text log
     """
@@ -91,11 +90,11 @@ def make_of(
         fixes = Fixes.from_log(flight.log.measured, accuracy_of(flight))
     if len(fixes) == 0 and (nmea is not None or ubx is not None):
         raise ValueError(f"no GPS fix arrived in {source}: nothing to export")
-    encoders: dict[str, tuple[Path | None, Callable[..., bytes]]] = {
-        "NMEA": (nmea, gps_messages.encode_nmea),
-        "UBX": (ubx, gps_messages.encode_ubx),
-    }
-    files = {name: (path, encode(fixes, start=start)) for name, (path, encode) in encoders.items() if path is not None}
+    files: dict[str, tuple[Path, bytes]] = {}
+    if nmea is not None:
+        files["NMEA"] = nmea, gps_messages.encode_nmea(fixes, start=start)
+    if ubx is not None:
+        files["UBX"] = ubx, gps_messages.encode_ubx(fixes, start=start)
     if csv is not None:
         columns = export_text.columns(flight)
         text = export_text.to_csv(columns).encode()
@@ -105,7 +104,7 @@ def make_of(
 
 
 def _require_apart(nmea: Path | None, ubx: Path | None, csv: Path | None) -> None:
-    """Require that something is to be written, each in a file of its own: ValueError."""
+    """ValueError unless there is a file to write, and each is named only once."""
     if nmea is None and ubx is None and csv is None:
         raise ValueError("nothing to write: name --nmea FILE, --ubx FILE, --csv FILE or several of them")
     named: dict[Path, str] = {}
@@ -114,7 +113,7 @@ def _require_apart(nmea: Path | None, ubx: Path | None, csv: Path | None) -> Non
         if path is None:
             continue
         if path.resolve() in named:
-            raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: each needs a file of its own")
+            raise ValueError(f"{named[path.resolve()]} and {option} both name {path}: use separate files")
         named[path.resolve()] = option
 
 
@@ -131,7 +130,7 @@ def map_of(csv: Path) -> Path:
 
 
 def accuracy_of(flight: Flight) -> Accuracy:
-    """What the receiver of `flight` may say of itself: the sigmas of its errors, unknown without a configuration."""
+    """The accuracies that the receiver of `flight` reports: the sigmas of its errors; unknown without a config."""
     config = flight.manifest.get("config")
     if config is None:
         return Accuracy()
@@ -147,11 +146,9 @@ def print_report(export: Export) -> None:
     """Print the table."""
     first_t_s, last_t_s = _span(export.fixes)
     times = ["none" if t is None else f"{export.utc(t):%H:%M:%S.%f}"[:-3] for t in (first_t_s, last_t_s)]
-    rows = []
-    for name, (path, data) in export.files.items():
-        of_fixes = name in ("NMEA", "UBX")
-        held = str(len(export.fixes)) if of_fixes else str(export.rows) if name == "CSV" else ""
-        rows.append((name, held, *(times if of_fixes else ("", "")), str(len(data)), str(path)))
+    fixes = str(len(export.fixes)), *times
+    held = {"NMEA": fixes, "UBX": fixes, "CSV": (str(export.rows), "", ""), "map": ("", "", "")}
+    rows = [(name, *held[name], str(len(data)), str(path)) for name, (path, data) in export.files.items()]
     headings = ("", "fixes, rows", "first, UTC", "last, UTC", "bytes", "file")
     title = f"GPS fixes of {export.utc(first_t_s or 0.0):%Y-%m-%d}" if "CSV" not in export.files else "exported"
     console.out().print(console.table(title, headings, rows, text=(0, 5)))

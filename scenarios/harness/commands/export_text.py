@@ -1,4 +1,4 @@
-"""A recorded flight as a text log: what was measured aboard in columns, the true attitude beside it, and its map.
+"""A recorded flight as a text log: the measurements in columns, the true attitude beside them, and a column map.
 
 A value stands in the row in which it arrived, and the cells below it are empty until the next.  Numbers are written
 with as many digits as bring them back bit for bit.  The column map beside it carries what is known of the
@@ -23,7 +23,7 @@ KNOWN_BY = ("set", "data sheet", "log")  # sources of a property that is knowled
 
 
 class Column(NamedTuple):
-    """One column of the file: its name, what the map says of it, and its numbers; NaN is an empty cell."""
+    """One column of the file: its name, its entry in the map, and its numbers; NaN is an empty cell."""
 
     name: str
     meaning: str
@@ -31,7 +31,7 @@ class Column(NamedTuple):
 
 
 def columns(flight: Flight) -> list[Column]:
-    """The columns of `flight`; those of an instrument that is not aboard, or never reported, are left out."""
+    """The columns of `flight`; those of an instrument without samples are left out."""
     rows, known = flight.log.measured, ours.known_of(flight)
     found = [Column("time_s", "time s", rows["t_s"]), Column("interval_s", "interval s", rows["dt_s"])]
     found += _vector("gyro_{}_rad_s", "gyro.{} rad/s", rows["gyro_b_rad_s"], "xyz")
@@ -69,7 +69,7 @@ def _gps(rows: Any, *, stamped: bool) -> list[Column]:
 
 
 def _is_stamped(known: dict[str, Known]) -> bool:
-    """Whether the stamps of the fixes are known to be there; an older recording says nothing of it."""
+    """Whether the fixes are known to have stamps; older recordings do not say."""
     entry = known.get("gps_stamped")
     return entry is None or (bool(entry.value) and entry.source in KNOWN_BY)
 
@@ -92,7 +92,7 @@ def to_csv(found: list[Column]) -> str:
 
 
 def _cells(values: Array) -> Iterator[str]:
-    """Numbers in the fewest digits that bring them back bit for bit."""
+    """Numbers with the fewest digits that restore them bit for bit."""
     return ("" if v != v else str(int(v)) if v.is_integer() and abs(v) < 1e15 and (v or str(v) == "0.0") else repr(v)
             for v in values.tolist())  # fmt: skip
 
@@ -103,7 +103,7 @@ def to_map(found: list[Column], flight: Flight, name: str) -> str:
     known = ours.known_of(flight)
     hidden = [n for n in properties.MEASURED if n in known and known[n].source not in KNOWN_BY]
     lines = [
-        f"# {name}: what its columns mean, and what is known of the instruments aboard.",
+        f"# {name}: what its columns mean, and what is known about the instruments.",
         'delimiter = ","',
         'decimal = "."',
         'reference = "truth"',
@@ -125,7 +125,7 @@ def to_map(found: list[Column], flight: Flight, name: str) -> str:
 
 
 def _toml(value: Any) -> str:
-    """A value as TOML spells it."""
+    """A value in TOML syntax."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_toml, value))}]"
     return str(value).lower() if isinstance(value, bool) else repr(value)

@@ -127,7 +127,7 @@ def replay_log(
 
 
 def _recorded(flight: Flight | None, log: RecordedLog, name: str, into: Path | None, rerun: bool) -> Path | None:
-    """Where `flight`, the replay of `log` by the estimator `name`, was recorded; None where it was not."""
+    """Where `flight`, the replay of `log` by the estimator `name`, was recorded; None if it was not."""
     if flight is None or into is None:
         return None
     with console.progress(f"recording {name}", "") as _:

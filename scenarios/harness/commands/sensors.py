@@ -30,7 +30,7 @@ class Subject:
 
     members : kind -> part, of a suite; empty for a part      devices : kind -> parameters
     sources : ``kind.field`` -> where the figure comes from; empty if there is no data sheet
-    settings : of a suite, what it says of its board, its converter and single figures, by dotted names
+    settings : of a suite, its board, converter and changed figures, by dotted names
     board : that the parts sit on
     """
 
@@ -56,7 +56,7 @@ class Page:
     air: Log | None
 
     def to_json(self) -> dict[str, Any]:
-        """The page as numbers named with their units; None if the data sheet is silent."""
+        """The page as numbers named with their units; None if the data sheet does not specify them."""
         about = self.subject
         data: dict[str, Any] = {"suite" if about.members else "part": about.name, "about": about.about}
         if about.members:

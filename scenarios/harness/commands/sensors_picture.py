@@ -1,6 +1,6 @@
 """The page of a sensor as one picture: its Allan deviation, and truth beside reading in a manoeuvre.
 
-Imported only when a picture is asked for: it brings matplotlib.
+Imported only to draw a picture, since it loads matplotlib.
 """
 
 import math

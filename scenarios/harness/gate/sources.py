@@ -25,11 +25,11 @@ from sim.recording import versions
 _ROOT = Path(__file__).resolve().parents[3]
 _OURS = ("estimator", "autopilot", "sim", "scenarios")
 _KINDS = {".py", ".toml", ".xml"}
-_PEERS = ("scipy", "ahrs", "imufusion", "vqf")  # packages of others that our estimators fly with
+_PEERS = ("scipy", "ahrs", "imufusion", "vqf")  # packages that our estimators use
 
 
 def decided_by(named: str, prepared: Prepared) -> dict[str, Any]:
-    """Everything that decides a flight; `named` is its scenario as it was named, which may be a file."""
+    """Everything that decides a flight; `named` is the name or file of its scenario."""
     config = prepared.config
     return {
         "scenario": prepared.scenario.name,
@@ -49,7 +49,7 @@ def fingerprint(decides: dict[str, Any]) -> str:
 
 @cache
 def _versions() -> dict[str, str]:
-    """Versions of all that computes; of the machine, what decides the last bits of a number."""
+    """Versions of the packages that compute, and the kind of machine, which decides the last bits of numbers."""
     found = {name: version for name, version in versions().items() if name != "python"}
     for package in _PEERS:
         try:
@@ -67,12 +67,12 @@ def _ours() -> str:
 
 
 def _of_scenario(named: str) -> str:
-    """The code of others that the scenario `named` is in, empty where it is of the project."""
+    """The user code of the scenario `named`; empty if the scenario is part of the project."""
     return _of_file(Path(named)) if named.endswith(".py") else _of_others(module_of_scenario(named))
 
 
 def _of_code(word: str, spec: str, module: str) -> str:
-    """The code of others behind `spec`, whose class is of `module`; empty where it is all of the project."""
+    """The user code of `spec`, whose class is in `module`; empty if it is part of the project."""
     if (library := library_named(spec)) is not None:
         return library.sha256
     place = spec.rpartition(":")[0] or module_of_offer(word, spec)
@@ -80,7 +80,7 @@ def _of_code(word: str, spec: str, module: str) -> str:
 
 
 def _of_others(*modules: str) -> str:
-    """Those of the imported `modules` that are of others; empty where none is."""
+    """The imported `modules` that are user code."""
     found = {name for name in modules if name in sys.modules and _is_others(sys.modules[name])}
     return _of_modules(frozenset(found)) if found else ""
 
@@ -95,7 +95,7 @@ def _of_file(path: Path) -> str:
 
 @cache
 def _of_modules(names: frozenset[str]) -> str:
-    """The modules of these names, the packages that they are of, and all modules of others that they use."""
+    """The modules of these names, their packages, and all user modules that they import."""
     files: set[Path] = set()
     seen, waiting = set(names), list(names)
     while waiting:
@@ -113,7 +113,7 @@ def _of_modules(names: frozenset[str]) -> str:
 
 
 def _package_of(module: ModuleType, path: Path) -> Iterable[Path]:
-    """All files of the package that a module is of."""
+    """All files of the package of a module."""
     depth = module.__name__.count(".")
     if not depth and path.name != "__init__.py":
         return ()
@@ -122,7 +122,7 @@ def _package_of(module: ModuleType, path: Path) -> Iterable[Path]:
 
 
 def _is_others(module: ModuleType) -> bool:
-    """Whether a module is neither of the project nor of Python itself."""
+    """Whether a module is part of neither the project nor Python."""
     path = _file_of(module)
     if path is None or path.suffix != ".py" or any(path.is_relative_to(_ROOT / name) for name in _OURS):
         return False
@@ -133,7 +133,7 @@ def _is_others(module: ModuleType) -> bool:
     return not any(path.is_relative_to(folder) for folder in standard)
 
 
-# Installed packages whose version is in the fingerprint, or decides nothing; others are read file by file.
+# Installed packages whose version is in the fingerprint or has no effect; others are read file by file.
 _FIXED = {"numpy", "numba", "llvmlite", "jsbsim", "scipy", "ahrs", "imufusion", "vqf", "pytest", "_pytest"}
 
 
