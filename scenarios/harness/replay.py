@@ -14,7 +14,7 @@ import operator
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,19 +148,19 @@ def replay(
     flown = Log.empty(len(log.rows))
     _truth_of(log, flown.truth)
     flown.measured[:] = log.rows
-    failure, ns_per_update, said = "", math.nan, _Said(known, None, {})
+    reports: dict[str, Any] = {"known": known, "rejected": None}
+    failure, ns_per_update = "", math.nan
     try:
         ns_per_update = _run(estimator, on_ground, log.rows, first, flown.flown, advance)
     except FlightCodeFailed as failed:
         failure = str(failed)
     try:
-        said = _said(estimator, known, float(log.rows["t_s"][-1]))
+        reports = _reports(estimator, known, float(log.rows["t_s"][-1]))
     except (FlightCodeFailed, PluginError) as failed:
         failure = failure or str(failed)
     judged = judged_rows(log, window, first)
     scores, spent = (_NO_SCORES, math.nan) if failure else (score(flown.flown["R_eb"], log, judged), ns_per_update)
-    about = short_name(spec), reference, flown, first
-    return Replayed(*about, spent, said.rejected, scores, failure, said.known, said.refused)
+    return Replayed(short_name(spec), reference, flown, first, spent, scores=scores, failure=failure, **reports)
 
 
 def gone(spec: str | Maker, failure: str) -> Replayed:
@@ -179,24 +179,17 @@ def _all_of(withheld: Sequence[str]) -> bool:
     return set(withheld) >= set(PROPERTIES)
 
 
-class _Said(NamedTuple):
-    """What an estimator reports after a replay."""
-
-    known: Mapping[str, Known]
-    rejected: int | None
-    refused: Mapping[str, int]
-
-
-def _said(estimator: object, known: Mapping[str, Known], t_s: float) -> _Said:
-    """What `estimator` reports after its replay; FlightCodeFailed or PluginError if that is invalid."""
-    told = learnt(estimator, known)
+def _reports(estimator: object, known: Mapping[str, Known], t_s: float) -> dict[str, Any]:
+    """Fields of `Replayed` that `estimator` reports; FlightCodeFailed or PluginError if they are invalid."""
+    now_known = learnt(estimator, known)
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, t_s):
         rejected = getattr(estimator, "rejected", None)
         refused = getattr(estimator, "refused", {})
         if not isinstance(refused, Mapping) or len(refused) > MOST_REFUSED:
             raise Refused(f"refused is {shown(refused)}, must be numbers of samples by instrument")
         counts = {printable(str(name)): _count(f"refused[{shown(name)}]", n) for name, n in refused.items()}
-        return _Said(told, None if rejected is None else _count("rejected", rejected), counts)
+        n_rejected = None if rejected is None else _count("rejected", rejected)
+        return {"known": now_known, "rejected": n_rejected, "refused": counts}
 
 
 def _count(name: str, value: object) -> int:

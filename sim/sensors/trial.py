@@ -41,25 +41,25 @@ REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: reached by a first-order lag afte
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Simulation of a gyro or an accelerometer at rest, and the names of its noise parameters.
+    """Simulation of a gyro or an accelerometer at rest.
 
     unit : of the report      scale : from SI to that unit
+    figures : names of its parameters for noise density, bias instability and random walk
     """
 
     module: Any
     unit: str
     scale: float
-    density: str
-    instability: str
-    walk: str
+    figures: tuple[str, str, str]
 
 
 INERTIAL: Final = {
     "gyro": Inertial(
-        gyro, "deg/s", math.degrees(1.0), "noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s",
+        gyro, "deg/s", math.degrees(1.0),
+        ("noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s"),
     ),
     "accelerometer": Inertial(
-        accelerometer, "ug", 1e6 / G_M_S2, "noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s",
+        accelerometer, "ug", 1e6 / G_M_S2, ("noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s"),
     ),
 }  # fmt: skip
 
@@ -166,8 +166,8 @@ def at_rest(
 
 def figures(kind: str, params: Any) -> tuple[float, float, float]:
     """Noise density, bias instability and random walk of a gyro or an accelerometer, in the unit of the report."""
-    how = INERTIAL[kind]
-    return getattr(params, how.density), getattr(params, how.instability), getattr(params, how.walk)
+    density, instability, walk = (getattr(params, name) for name in INERTIAL[kind].figures)
+    return density, instability, walk
 
 
 def step(kind: str, params: Any) -> float:

@@ -16,7 +16,7 @@ from scenarios.harness.cli.reports import attempt, check_picture, reporting, usa
 from sim.aeroplane import performance
 from sim.aeroplane.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.aeroplane.jsbsim_model import Model
-from sim.aeroplane.linear import LinearModel, Mode, linearise, modes
+from sim.aeroplane.linear import Mode, linearise, modes
 from sim.aeroplane.performance import Performance, radius_m
 from sim.aeroplane.trim import Trim
 
@@ -44,7 +44,6 @@ class Handbook:
     model: Model
     frame: Airframe
     performance: Performance
-    linear: LinearModel
     modes: tuple[Mode, ...]
     textbook: dict[str, Mode]
     lanchester: Mode
@@ -103,7 +102,7 @@ def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
     frame = Airframe.of(model, linear)
     simple = lanchester(p.cruise.airspeed_m_s, frame.lift_n / frame.drag_n)
     derivatives = coefficients(linear, frame)
-    return Handbook(name, model, frame, p, linear, modes(linear), textbook(linear), simple, derivatives)
+    return Handbook(name, model, frame, p, modes(linear), textbook(linear), simple, derivatives)
 
 
 def glide_ratio(t: Trim) -> float:

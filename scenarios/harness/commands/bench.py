@@ -9,7 +9,7 @@ programs disturbed the measurement.
 import platform
 import statistics
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from time import perf_counter_ns
 from typing import Any
 
@@ -46,33 +46,34 @@ _NS_PER_US = 1e3
 class Speed:
     """The measurements.
 
-    bare_us, closed_us : per tick, least of the repeats           median_ratio : over the pairs
-    stages_us : per tick, by stage, recording included            update_ns : the estimator's `update`, per call
-    kernel_ns : its kernel over a whole log in one call, per tick; None if it has none (no `replay`)
+    closed_loop_ratio_median : over the pairs of flights
+    bare_us_per_tick, closed_loop_us_per_tick : least of the repeats      stages_us_per_tick : recording included
+    estimator_ns_per_call : its kernel over a whole log in one call, per tick; None if it has none (no `replay`)
+    estimator_update_ns : a call of its `update`      ticks : of one flight      repeats : pairs of flights
     """
 
+    closed_loop_ratio_median: float
+    bare_us_per_tick: float
+    closed_loop_us_per_tick: float
+    stages_us_per_tick: dict[str, float]
     estimator: str
-    n_ticks: int
+    estimator_ns_per_call: float | None
+    estimator_update_ns: float
+    ticks: int
     repeats: int
-    bare_us: float
-    closed_us: float
-    median_ratio: float
-    stages_us: dict[str, float]
-    update_ns: float
-    kernel_ns: float | None
 
     @property
     def ratio(self) -> float:
         """Closed loop over bare."""
-        return self.closed_us / self.bare_us
+        return self.closed_loop_us_per_tick / self.bare_us_per_tick
 
     @property
     def rows(self) -> list[Row]:
         """The requirements, with their limits."""
         requirements = (
             ("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
-            (f"{self.estimator}: update()", "ns", self.update_ns, UPDATE_LIMIT_NS),
-            (f"{self.estimator}: kernel", "ns", self.kernel_ns, KERNEL_LIMIT_NS),
+            (f"{self.estimator}: update()", "ns", self.estimator_update_ns, UPDATE_LIMIT_NS),
+            (f"{self.estimator}: kernel", "ns", self.estimator_ns_per_call, KERNEL_LIMIT_NS),
         )
         return [
             Row(name, unit, value, "<=", limit, value <= limit)
@@ -87,21 +88,8 @@ class Speed:
 
     def to_json(self) -> dict[str, Any]:
         """The values by name; names include the unit."""
-        return {
-            "passed": self.passed,
-            "closed_loop_ratio": self.ratio,
-            "closed_loop_ratio_median": self.median_ratio,
-            "bare_us_per_tick": self.bare_us,
-            "closed_loop_us_per_tick": self.closed_us,
-            "stages_us_per_tick": self.stages_us,
-            "estimator": self.estimator,
-            "estimator_ns_per_call": self.kernel_ns,
-            "estimator_update_ns": self.update_ns,
-            "ticks": self.n_ticks,
-            "repeats": self.repeats,
-            "python": platform.python_version(),
-            "machine": platform.machine(),
-        }
+        machine = {"python": platform.python_version(), "machine": platform.machine()}
+        return {"passed": self.passed, "closed_loop_ratio": self.ratio} | asdict(self) | machine
 
 
 _BENCHMARK = "the benchmark"
@@ -217,15 +205,15 @@ def _measured(estimator: str, seconds: float, repeats: int, advance: Callable[[i
     cost = cruise.cost()
     by_repeat = [cruise.stages_us() for _ in range(max(3, repeats // 4))]
     return Speed(
+        closed_loop_ratio_median=statistics.median(c / b for c, b in zip(closed, bare, strict=True)),
+        bare_us_per_tick=min(bare),
+        closed_loop_us_per_tick=min(closed),
+        stages_us_per_tick={stage: min(stages[stage] for stages in by_repeat) for stage in STAGES},
         estimator=estimator,
-        n_ticks=len(cruise.log),
+        estimator_ns_per_call=cost.replay_ns,
+        estimator_update_ns=cost.update_ns,
+        ticks=len(cruise.log),
         repeats=repeats,
-        bare_us=min(bare),
-        closed_us=min(closed),
-        median_ratio=statistics.median(c / b for c, b in zip(closed, bare, strict=True)),
-        stages_us={stage: min(stages[stage] for stages in by_repeat) for stage in STAGES},
-        update_ns=cost.update_ns,
-        kernel_ns=cost.replay_ns,
     )
 
 
@@ -233,11 +221,11 @@ def print_report(speed: Speed) -> None:
     """The figures, and where the time goes."""
     out = console.out()
     out.print(console.verdict_table("speed in still air", speed.rows))
-    parts = {"bare JSBSim": speed.bare_us, "closed loop": speed.closed_us}
-    parts |= {f"  {stage}": us for stage, us in speed.stages_us.items()}
+    parts = {"bare JSBSim": speed.bare_us_per_tick, "closed loop": speed.closed_loop_us_per_tick}
+    parts |= {f"  {stage}": us for stage, us in speed.stages_us_per_tick.items()}
     out.print(console.figure_table("where the time goes", parts, "us per tick"))
-    pairs = f"{speed.repeats} pairs of {speed.n_ticks} ticks; median ratio of the pairs {speed.median_ratio:.2f}"
-    out.print(Text(f"{pairs} (least over least {speed.ratio:.2f})"))
+    ratios = f"median ratio of the pairs {speed.closed_loop_ratio_median:.2f} (least over least {speed.ratio:.2f})"
+    out.print(Text(f"{speed.repeats} pairs of {speed.ticks} ticks; {ratios}"))
 
 
 def run(estimator: str, seconds: float, repeats: int, json_: str | None) -> int:

@@ -6,6 +6,7 @@ Printed and as JSON.  What it does is tried out in `sim.sensors.trial`.
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
+from itertools import count
 from typing import Any, Final
 
 from scenarios.harness.cli import console
@@ -113,12 +114,10 @@ def make(
     devices = subject.devices
     inertial = [kind for kind in INERTIAL if kind in devices]
     air = {kind: devices[kind] for kind in ("airspeed", "barometer") if kind in devices}
-    done = 0
+    hours, done = 3.0 * seconds / 3600.0, count(1)  # of a record's three axes
 
     def step() -> None:
-        nonlocal done
-        done += 1
-        advance(3 * done * seconds / 3600.0, 3 * len(inertial) * flights * seconds / 3600.0)
+        advance(next(done) * hours, len(inertial) * flights * hours)
 
     rest = {kind: sensor_trial.at_rest(kind, devices[kind], flights, seconds, step) for kind in inertial}
     return Page(
