@@ -26,37 +26,35 @@ def require_year(owner: str, year: float) -> None:
 
 
 @cache
-def _model(first_year: int = int(FIRST_YEAR)) -> Any:
+def _model(first_year: int) -> Any:
     from pygeomag import GeoMag  # not loaded by a flight without a magnetometer
 
     return GeoMag(base_year=first_year)
 
 
+def _calculated(latitude_deg: float, longitude_deg: float, height_m: float, year: float, first_year: float) -> Any:
+    """The field by the model of `first_year`; ValueError if there is no such place."""
+    for name, angle_deg, most_deg in (("latitude_deg", latitude_deg, 90.0), ("longitude_deg", longitude_deg, 180.0)):
+        if not abs(angle_deg) <= most_deg:
+            raise ValueError(f"{name} = {angle_deg!r} deg: choose an angle from {-most_deg:g} to {most_deg:g} deg")
+    return _model(int(first_year)).calculate(glat=latitude_deg, glon=longitude_deg, alt=1e-3 * height_m, time=year)
+
+
 @cache
 def field_e_ut(latitude_deg: float, longitude_deg: float, height_m: float, year: float) -> Array:
-    """The field in north, east, down.
+    """The field in north, east, down, microtesla, shape (3,), read-only.
 
-    Parameters
-    ----------
-    latitude_deg, longitude_deg     geodetic, -90..90 and -180..180
-    height_m                        above the ellipsoid (or the sea: 30 m are 1 nT)
-    year                            decimal, 2025..2030
-
-    Returns
-    -------
-    shape (3,)      microtesla, read-only
+    latitude_deg, longitude_deg : geodetic, -90..90 and -180..180      year : decimal, 2025..2030
+    height_m : above the ellipsoid (or the sea: 30 m are 1 nT)
 
     Raises
     ------
     ValueError      no such place on earth, or a date that the model does not cover
     """
     require_year("year", year)
-    for name, angle_deg, most_deg in (("latitude_deg", latitude_deg, 90.0), ("longitude_deg", longitude_deg, 180.0)):
-        if not abs(angle_deg) <= most_deg:
-            raise ValueError(f"{name} = {angle_deg!r} deg: choose an angle from {-most_deg:g} to {most_deg:g} deg")
     if not -1e3 <= height_m <= 850e3:
         raise ValueError(f"height_m = {height_m!r} m: choose a height from -1000 to 850000 m, which the model covers")
-    found = _model().calculate(glat=latitude_deg, glon=longitude_deg, alt=1e-3 * height_m, time=year)
+    found = _calculated(latitude_deg, longitude_deg, height_m, year, FIRST_YEAR)
     field = 1e-3 * np.array([found.x, found.y, found.z])  # from nanotesla
     field.flags.writeable = False
     return field
@@ -64,21 +62,10 @@ def field_e_ut(latitude_deg: float, longitude_deg: float, height_m: float, year:
 
 @cache
 def declination_rad(latitude_deg: float, longitude_deg: float, height_m: float, year: float) -> float:
-    """Magnetic north from true north, positive to the east, by the model of that year.
+    """Magnetic north from true north, positive to the east, by the model of that year; see `field_e_ut`.
 
-    Parameters
-    ----------
-    latitude_deg, longitude_deg     geodetic, -90..90 and -180..180
-    height_m                        above the ellipsoid
-    year                            decimal; clipped to 2010..2030
-
-    Raises
-    ------
-    ValueError      no such place on earth
+    year : decimal; clipped to 2010..2030
     """
-    if not (abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 180.0):
-        raise ValueError(f"latitude {latitude_deg!r}, longitude {longitude_deg!r} deg: choose a place on earth")
     year = min(max(year, EARLIEST_YEAR), LAST_YEAR)
-    model = _model(int(min(5.0 * (year // 5.0), FIRST_YEAR)))
-    found = model.calculate(glat=latitude_deg, glon=longitude_deg, alt=1e-3 * height_m, time=year)
-    return math.radians(found.d)
+    first_year = min(5.0 * (year // 5.0), FIRST_YEAR)
+    return math.radians(_calculated(latitude_deg, longitude_deg, height_m, year, first_year).d)

@@ -69,7 +69,9 @@ if TYPE_CHECKING:
 
     __version__: str
 
-_hidden.require_ours()
+# pytest imports this package for its plugin, also for tests that never use it: there, first use is early enough.
+if not _hidden.in_pytest():
+    _hidden.require_ours()
 
 _HOMES = {
     "estimator.interface": (
@@ -141,6 +143,7 @@ def __getattr__(name: str) -> Any:
 
         value: Any = version("wingslevel")
     elif name in _HOME:
+        _hidden.require_ours()
         value = getattr(import_module(_HOME[name]), name)
     else:
         raise AttributeError(f"module 'wingslevel' has no attribute {name!r}")

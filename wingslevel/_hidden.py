@@ -12,6 +12,11 @@ _HOME = Path(__file__).resolve().parents[1]
 USAGE = 2  # exit code of the command
 
 
+def in_pytest() -> bool:
+    """Whether this process is one of pytest."""
+    return "_pytest.config" in sys.modules
+
+
 def require_ours() -> None:
     """Require that an import of each of our packages gives ours.
 

@@ -172,7 +172,9 @@ def yaw_lock(seeds: Sequence[int]) -> Finding:
     course = Panel(f"Heading after the release, W_Y = {LARGE:g}", "minus course, deg", yticks=(0, 45, 90, 135, 180))
     course.flights(thrown[LARGE], heading_error_deg("course"), BLUE, "", 0.0, 8.0)
     course.level(LOCKED_DEG, text="locked below 15 deg")
-    by_weight = Panel("Time to lock", "s", "weight of the yaw correction", log="x", xticks=WEIGHTS, ylim=(0.0, 20.0))
+    by_weight = Panel(
+        "Time to lock", "s", "weight of the yaw correction", log="x", xticks=WEIGHTS, xlim=(0.07, 3.4), ylim=(0.0, 20.0)
+    )
     for w in WEIGHTS:
         found = [t for t in times[w] if math.isfinite(t)]
         by_weight.cloud(w, found, BLUE if w == LARGE else ORANGE)

@@ -104,7 +104,7 @@ def yaw_from_acceleration() -> Finding:
         errors[bank] = np.degrees(np.abs(heading_error_rad(R, log.truth["R_eb"])))
     straight, turning = float(errors[0.0][-1]), float(errors[BANK_DEG][-1])
 
-    panel = Panel("A heading error of 30 degrees vanishes in turns", "heading error, deg")
+    panel = Panel("A heading error of 30 degrees vanishes in turns", "heading error, deg", columns=4, ylim=(0.0, 38.0))
     shown = {f"{bank:.0f}° of bank" if bank else "straight flight": error for bank, error in errors.items()}
     panel.curves(log.truth["t_s"], shown, (FAINT, ORANGE, BLUE, GREEN))
     return Finding(

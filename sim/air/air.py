@@ -127,17 +127,14 @@ class MovingAir:
         begin(self.state, self._noise, self._gusts, self._places)
 
     def blow(self, truth: Array, k: int) -> list[float]:
-        """The air of tick `k` at the place of truth row k - 1, as `now`.
-
-        Called once for each tick, in order.
-        """
+        """The air of tick `k` at the position of truth row k - 1, as `now`; call once per tick, in order."""
         blow(truth, k, self.state, self._noise, self._gusts, self._places)
         return self._now.tolist()
 
 
 @kernel
 def _gather(t_s, distance_m, z, s, gusts, places):  # type: ignore[no-untyped-def]
-    """Write into ``s.now`` what blows at ``s.p_e_m``, `distance_m` of air further, at `t_s` since power-up."""
+    """Write wind and rates at ``s.p_e_m`` into ``s.now``, `distance_m` further through the air, at `t_s`."""
     height_m = -s.p_e_m[2]
     wind_e, rate_b = s.now[:3], s.now[3:]
     share = share_of_wind(height_m, s.shear)
@@ -152,13 +149,13 @@ def _gather(t_s, distance_m, z, s, gusts, places):  # type: ignore[no-untyped-de
 
 @kernel
 def begin(state, noise, gusts, places):  # type: ignore[no-untyped-def]
-    """The air at power-up: the turbulence as after a flight so long that nothing is left of its start."""
+    """The air at power-up, with stationary turbulence."""
     _gather(0.0, dryden.FAR_M, noise[0], state[0], gusts, places)
 
 
 @kernel
 def blow(truth, k, state, noise, gusts, places):  # type: ignore[no-untyped-def]
-    """The air of tick k, for the aeroplane where and as fast as truth row k - 1 has it."""
+    """The air of tick k at position and airspeed of truth row k - 1."""
     s = state[0]
     if k > 0:
         last = truth[k - 1]

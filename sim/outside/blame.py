@@ -34,20 +34,17 @@ class Refused(ValueError):
     """User code returned something invalid; the message is the text alone, without class and place."""
 
 
+_switch = {"tracebacks": False}
+
+
 def tracebacks_shown() -> bool:
     """Whether this process shows full tracebacks."""
-    return _Switch.on
-
-
-class _Switch:
-    """Whether this process shows full tracebacks."""
-
-    on = False
+    return _switch["tracebacks"]
 
 
 def show_tracebacks(on: bool) -> None:
     """Write full tracebacks of user code to standard error, besides the one-line message, or not."""
-    _Switch.on = on
+    _switch["tracebacks"] = on
 
 
 class theirs:
@@ -149,7 +146,7 @@ def _is_theirs(frame: FrameType, home: str) -> bool:
 
 def show_traceback(error: BaseException) -> None:
     """Write the traceback of `error` to standard error, if tracebacks are enabled."""
-    if not (_Switch.on or os.environ.get(TRACEBACK) == "1"):
+    if not (tracebacks_shown() or os.environ.get(TRACEBACK) == "1"):
         return
     try:
         text = "".join(traceback.format_exception(error))

@@ -1,10 +1,10 @@
-"""Entry points of installed packages: what they offer by name, found without importing it.
+"""Entry points of installed packages, found without importing them.
 
     [project.entry-points."wingslevel.estimators"]
     my_filter = "my_package.filters:MyFilter"
 
-The groups are ``wingslevel.estimators``, ``.autopilots``, ``.scenarios`` and ``.suites``.  A name that wingslevel has
-itself, or that an earlier package offers, is ignored, and `ignored` says so.
+The groups are ``wingslevel.estimators``, ``.autopilots``, ``.scenarios`` and ``.suites``.  Names already used by
+wingslevel or by an earlier package are ignored; `ignored` lists them.
 """
 
 import importlib
@@ -22,8 +22,8 @@ OURS = "wingslevel"
 class Offer(NamedTuple):
     """One entry point.
 
-    kind : "estimators", "autopilots", "scenarios" or "suites"      value : what it points to, ``package.module:Name``
-    origin : the distribution that offers it, with its version, ``my_package 1.2``
+    kind : "estimators", "autopilots", "scenarios" or "suites"      value : its target, ``package.module:Name``
+    origin : distribution and version, ``my_package 1.2``
     """
 
     kind: str
@@ -33,23 +33,23 @@ class Offer(NamedTuple):
 
     @property
     def module(self) -> str:
-        """The module that it points to."""
+        """The module of the target."""
         return self.value.partition(":")[0].strip()
 
     @property
     def package(self) -> str:
-        """The top-level package of its module: where an error is theirs."""
+        """The top-level package of the module, which contains the user code."""
         return self.module.partition(".")[0]
 
     def load(self) -> Any:
-        """Import what it points to: the module, or an attribute of it.  Raises whatever their code raises."""
+        """Import the target, a module or its attribute; may raise any exception of the user code."""
         point = EntryPoint(self.name, self.value, f"{OURS}.{self.kind}")
         if not point.pattern.match(self.value):
             raise Refused(f"{shown(self.value)} must be package.module:Name")
         return point.load()
 
     def resource(self) -> Path | None:
-        """The file that ``package:file.toml`` points to, None where it points to a Python object."""
+        """The file of a target ``package:file.toml``; None for a Python object."""
         _, _, name = (part.strip() for part in self.value.partition(":"))
         if not name.endswith(".toml"):
             return None
@@ -57,7 +57,7 @@ class Offer(NamedTuple):
 
 
 def offered(kind: str, ours: Container[str]) -> dict[str, Offer]:
-    """What installed packages offer of a kind, by name; names in `ours` are left out."""
+    """Entry points of a kind, by name, without the names in `ours`."""
     found: dict[str, Offer] = {}
     for offer in _offers(kind):
         if offer.name not in ours:
@@ -66,7 +66,7 @@ def offered(kind: str, ours: Container[str]) -> dict[str, Offer]:
 
 
 def ignored(kind: str, ours: Container[str], name: str | None = None) -> list[str]:
-    """A line for each entry point (of that `name`) that is not used, because its name is taken."""
+    """A line for each entry point (of that `name`) that is ignored because its name is taken."""
     lines: list[str] = []
     first: dict[str, Offer] = {}
     for offer in _offers(kind):
@@ -89,7 +89,7 @@ def _offers(kind: str) -> Iterator[Offer]:
 def _points(group: str) -> list[EntryPoint]:
     try:
         return list(entry_points(group=group))
-    except Exception:  # one package with damaged metadata hides no other
+    except Exception:  # damaged metadata of one package must not hide the others
         return [point for each in _readable() for point in each if point.group == group]
 
 
@@ -97,14 +97,14 @@ def _readable() -> Iterator[list[EntryPoint]]:
     for distribution in distributions():
         try:
             yield list(distribution.entry_points)
-        except Exception:  # metadata of anyone
+        except Exception:  # damaged metadata
             continue
 
 
 def _origin(point: EntryPoint) -> str:
     try:
         return printable(f"{point.dist.name} {point.dist.version}") if point.dist else "an installed package"
-    except Exception:  # metadata of anyone
+    except Exception:  # damaged metadata
         return "an installed package"
 
 

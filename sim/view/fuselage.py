@@ -44,7 +44,7 @@ _SAILPLANE = np.array(
 
 
 def fuselage(g: Mapping[str, float], centre_z_m: float, tail_z_m: float) -> Mesh:
-    """Fuselage of rounded sections, its ends closed flat."""
+    """Fuselage of rounded sections with flat ends."""
     across, down = _superellipse(24, 2.5)
     table = _POWERED if g["propeller_diameter_m"] > 0.0 else _SAILPLANE
     half_width, half_height = 0.5 * g["fuselage_width_m"], 0.5 * g["fuselage_height_m"]
@@ -57,7 +57,7 @@ def fuselage(g: Mapping[str, float], centre_z_m: float, tail_z_m: float) -> Mesh
 
 
 def canopy(g: Mapping[str, float], centre_z_m: float) -> Mesh:
-    """A glazed bulge on top of the nose, between the motor and the wing."""
+    """A canopy on top of the nose, between motor and wing."""
     ahead_m = g["nose_x_m"] - g["wing_x_m"] - 0.10 * g["fuselage_length_m"]
     across, down = _superellipse(20, 2.0)
     along = np.cos(np.linspace(0.06 * np.pi, 0.94 * np.pi, 11))
@@ -90,7 +90,7 @@ def disc(centre_m: tuple[float, float, float], radius_m: float) -> Mesh:
 
 
 def _superellipse(n: int, exponent: float) -> tuple[Array, Array]:
-    """Points round a rounded square of half side 1: across and down, the extremes among them where 4 divides `n`."""
+    """Points of a rounded square of half side 1: across and down; includes the extremes if `n` is a multiple of 4."""
     angle = np.linspace(0.0, 2.0 * np.pi, n, endpoint=False)
     across, down = (np.sign(f) * np.abs(f) ** (2.0 / exponent) for f in (np.cos(angle), np.sin(angle)))
     across[np.abs(across) < 1e-9], down[np.abs(down) < 1e-9] = 0.0, 0.0

@@ -45,10 +45,10 @@ def section(thickness: float, camber: float, hinge: float) -> Section:
     Thickness polynomial of the four-digit family with the closed trailing edge, a parabolic mean line highest at
     40 % (Abbott & von Doenhoff, Theory of Wing Sections, 1959, section 6.4).
 
-    The fixed part ends in a face at the hinge; the hinged part has a round nose about the hinge which lies inside the
-    fixed part, so that no gap opens however it is deflected.
+    The fixed part ends in a face at the hinge; the hinged part has a round nose inside the fixed part, so that no gap
+    opens at any deflection.
     """
-    x_fore = hinge * (1.0 - np.sin(np.linspace(0.0, 0.5 * np.pi, _FORE)))  # close together at the nose
+    x_fore = hinge * (1.0 - np.sin(np.linspace(0.0, 0.5 * np.pi, _FORE)))  # denser at the nose
     fore = _heights(x_fore, thickness, camber)
     half = 0.5 * (fore[0][0] - fore[1][0])
     axis = np.array([hinge, fore[1][0] + half])
@@ -77,7 +77,7 @@ def section(thickness: float, camber: float, hinge: float) -> Section:
 def _heights(x: Array, thickness: float, camber: float) -> tuple[Array, Array]:
     """Top and bottom of the unit section at the fractions `x` of the chord."""
     half = 5.0 * thickness * (0.2969 * np.sqrt(x) - 0.126 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4)
-    half[x == 1.0] = 0.0  # the coefficients add up to nothing but for the last bit
+    half[x == 1.0] = 0.0  # the coefficients sum to zero except for round-off
     p = 0.4
     ahead, behind = (2.0 * p * x - x**2) / p**2, (1.0 - 2.0 * p + 2.0 * p * x - x**2) / (1.0 - p) ** 2
     line = camber * np.where(x < p, ahead, behind)
@@ -85,11 +85,11 @@ def _heights(x: Array, thickness: float, camber: float) -> tuple[Array, Array]:
 
 
 def loft(rings: Array, *, closed: bool = False) -> Mesh:
-    """Skin over `rings`, shape (s, k, 3), and flat ends.
+    """Skin over `rings`, shape (s, k, 3), with flat ends.
 
-    A ring given twice makes an edge there, likewise a point given twice in every ring.
+    A duplicate ring makes an edge there, and so does a point duplicated in every ring.
 
-    closed : the ring's last point joins its first smoothly; else the two coincide, at a sharp trailing edge
+    closed : the last point of a ring joins the first smoothly; if not, they coincide at a sharp trailing edge
     """
     s, k, _ = rings.shape
     grid = np.arange(s * k).reshape(s, k)
@@ -98,7 +98,7 @@ def loft(rings: Array, *, closed: bool = False) -> Mesh:
     a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
     skin = np.concatenate((np.stack((a, b, c), -1).reshape(-1, 3), np.stack((a, c, d), -1).reshape(-1, 3)))
     n = k if closed else k - 1  # the ends are polygons of distinct points
-    # Zip the polygon from its first point: top and bottom in turn, so that a cambered section stays inside itself.
+    # Triangulate from the first point, top and bottom alternately, so that triangles stay inside a cambered section.
     zipped = []
     low, high = 0, n - 1
     while high - low >= 2:
@@ -113,13 +113,13 @@ def loft(rings: Array, *, closed: bool = False) -> Mesh:
 
 
 def signed_volume_m3(mesh: Mesh) -> float:
-    """Volume inside a closed mesh (divergence theorem); negative where its triangles face inward."""
+    """Volume inside a closed mesh (divergence theorem); negative if its triangles face inward."""
     a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
 
 
 def finished(vertices: Array, triangles: NDArray[np.int64]) -> Mesh:
-    """Mesh without triangles that are none or vertices that none uses, turned outward, with area-weighted normals."""
+    """Mesh without degenerate triangles or unused vertices, facing outward, with area-weighted normals."""
     corners = vertices[triangles]
     flat = np.any([np.all(corners[:, i] == corners[:, i - 1], axis=1) for i in range(3)], axis=0)
     used, index = np.unique(triangles[~flat], return_inverse=True)

@@ -18,7 +18,7 @@ class Viewer:
     """A viewer process that was started.
 
     process : of the viewer, which outlives this one     url : its gRPC server, for `LiveView`
-    address : to be opened in a browser; None where a window opens by itself
+    address : to be opened in a browser; None if a window opens
     """
 
     process: subprocess.Popen[bytes]

@@ -11,6 +11,7 @@ from scenarios.harness.cli.app import run
 from scenarios.harness.plugins import load_estimator
 from sim import recording
 from sim.log import Outcome
+from sim.outside import entry_points
 from sim.outside.signals import TimedOut, limited
 
 # What is raised: what it needs at the head of the file, the statement, and the line that tells of it.
@@ -292,9 +293,10 @@ def test_entry_point_that_raises_is_refused_with_the_line_of_its_package(
     (folder / "__init__.py").write_text(own("import", raised))
     monkeypatch.syspath_prepend(str(folder.parent))
     point = EntryPoint("theirs", f"offered_{raised}:Mine", "wingslevel.estimators")
-    monkeypatch.setattr(plugins, "entry_points", lambda group: [point] if group == point.group else [])
+    monkeypatch.setattr(entry_points, "entry_points", lambda group: [point] if group == point.group else [])
     number = 1 + own("import", raised).splitlines().index(RAISED[raised][1])
-    with pytest.raises(plugins.PluginError, match=rf"estimator 'theirs': .* \(__init__\.py, line {number}\)$"):
+    line = rf"estimator 'theirs' of an installed package: .* \(__init__\.py, line {number}\)$"
+    with pytest.raises(plugins.PluginError, match=line):
         load_estimator("theirs")
 
 
