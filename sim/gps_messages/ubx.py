@@ -180,7 +180,7 @@ def _take(where: str, m: Any, epochs: dict[int, Epoch], problems: list[Problem])
     if not m.gnssFixOk or m.invalidLlh or m.fixType not in (_2D, _3D, _WITH_DEAD_RECKONING):
         epochs[ns] = Epoch(where, void=True)
         return
-    accuracies = *(_known(units, 1000) for units in (m.hAcc, m.vAcc, m.sAcc)), _known(round(m.headAcc * 1e5), 10**5)
+    horizontal_m, vertical_m, speed_m_s = (_known(units, 1000) for units in (m.hAcc, m.vAcc, m.sAcc))
     epochs[ns] = Epoch(
         where,
         latitude_deg=m.lat,
@@ -189,7 +189,7 @@ def _take(where: str, m: Any, epochs: dict[int, Epoch], problems: list[Problem])
         v_e_m_s=(m.velN / 1000, m.velE / 1000, m.velD / 1000),
         course_deg=m.headMot % 360.0,
         speed_m_s=m.gSpeed / 1000,
-        accuracy=accuracies,
+        accuracy=(horizontal_m, vertical_m, speed_m_s, _known(round(m.headAcc * 1e5), 10**5)),
         satellites=m.numSV,
     )
 
