@@ -292,7 +292,7 @@ def _check_kind(path: Path) -> None:
 
 
 def _described(functions: _Functions, of: Library) -> _Described:
-    """What the library says of itself; Refused where that cannot be used."""
+    """The description that the library gives; Refused if it is invalid."""
     file, pointer = of.path.name, functions.describe(ABI_VERSION)
     again = "rebuild it with the header in `python -m wingslevel.include`"
     if not pointer:

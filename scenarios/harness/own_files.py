@@ -1,9 +1,9 @@
 """Modules in the user's files: estimators, autopilots and scenarios named as ``path/to/file.py``.
 
-A file is run anew each time, so that flights share nothing.  Its module has the name under which it would be imported
-if that name is free; else, as for a second file of that name, one made of its path.  Compiled kernels are cached
-with the name of their module in them: those of a file under such a name are cached apart, so that what one process
-caches another can load, whatever it calls the file.
+A file is run again for each flight, so that flights share nothing.  Its module has the name under which it would be
+imported, if that name is free; otherwise, as for a second file of that name, a name made from its path.  Compiled
+kernels are cached with the name of their module.  Kernels of a file with a name made from its path are cached in a
+separate folder, so that any process can load them.
 """
 
 import hashlib

@@ -21,7 +21,7 @@ from sim.outside.signals import Interrupted, TimedOut, check, heard, listening
 from sim.outside.wording import class_name, described, printable
 
 TRACEBACK = "WINGSLEVEL_TRACEBACK"  # environment variable: 1 shows full tracebacks, in workers too
-_PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
+_PACKAGES = ("estimator", "autopilot", "sim", "scenarios", "wingslevel")
 _ROOT = Path(__file__).resolve().parents[2]
 _NOT_THEIRS = tuple(
     f"{path}{os.sep}"

@@ -15,7 +15,10 @@ from xml.etree import ElementTree
 
 from flips import Flip
 
-COPIED = ("estimator", "autopilot", "sim", "scenarios", "tests", "docs", "pyproject.toml", "README.md", "Makefile")
+COPIED = (
+    "estimator", "autopilot", "sim", "scenarios", "wingslevel",
+    "tests", "docs", "pyproject.toml", "README.md", "Makefile",
+)  # fmt: skip
 PASSED, NONE_COLLECTED, OUT_OF_TIME = 0, 5, -1
 BUSY = 10.0  # a busy machine may take so many seconds for one of computing
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 from autopilot.airframes import AutopilotParams, params_of
-from autopilot.dcm import _ASKED, _PARAMS, _STATE, _write
+from autopilot.dcm import _SETPOINT, _PARAMS, _STATE, _write
 from autopilot.energy import (
     EnergyParams,
     believe_airspeed,
@@ -146,7 +146,7 @@ def test_headwind_is_seen_from_the_wind_or_from_the_ground_speed(towards, ground
 @pytest.mark.parametrize(("asked_m_s", "wanted_m_s"), [(15.0, 15.0), (2.0, 1.2 * PARAMS.stall_m_s), (90.0, 18.0)])
 def test_airspeed_wanted_is_the_one_asked_for_within_limits(asked_m_s, wanted_m_s):
     """No slower than 1.2 times the stall, no faster than level flight."""
-    asked, s = np.zeros(1, _ASKED), state()
+    asked, s = np.zeros(1, _SETPOINT), state()
     _write(Setpoint(Mode.COURSE, airspeed_m_s=asked_m_s), asked[0])
     want_airspeed(asked[0], True, s, record()["energy"])
     assert s["airspeed_wanted_m_s"] == wanted_m_s
@@ -156,7 +156,7 @@ def test_airspeed_wanted_is_the_one_asked_for_within_limits(asked_m_s, wanted_m_
 
 def test_airspeed_asked_for_last_does_not_hold_without_the_radio():
     """Home at the speed that the wind needs: a slow one, asked for before, would never arrive."""
-    asked, s = np.zeros(1, _ASKED), state()
+    asked, s = np.zeros(1, _SETPOINT), state()
     _write(Setpoint(Mode.COURSE, airspeed_m_s=9.0, radio=False), asked[0])
     want_airspeed(asked[0], True, s, record()["energy"])
     assert s["airspeed_wanted_m_s"] == CRUISE_M_S

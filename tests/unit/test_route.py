@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.airframes import AutopilotParams
-from autopilot.dcm import _ASKED, _PARAMS, _STATE, _write
+from autopilot.dcm import _SETPOINT, _PARAMS, _STATE, _write
 from autopilot.energy import EnergyParams
 from autopilot.guidance import GuidanceParams, gps_age, unseen_turn
 from autopilot.interface import Mode, Setpoint, Waypoint
@@ -47,7 +47,7 @@ def records(route=None):
 
 
 def asked_of(setpoint):
-    asked = np.zeros(1, _ASKED)
+    asked = np.zeros(1, _SETPOINT)
     _write(setpoint, asked[0])
     return asked[0]
 

@@ -36,7 +36,7 @@ class Replays:
     folders : recordings by estimator, None for one that was not, or could not be, written
     flights : each replay as a flight, by estimator; none for one that ended its process
     not_judged : why nothing was judged, empty if something was
-    notes : parameters that only some of the estimators have, and the like, a line each
+    notes : parameters that only some of the estimators have, and the like, one line each
     """
 
     log: RecordedLog
@@ -159,7 +159,7 @@ def print_report(replays: Replays) -> None:
         console.line(f"note        {line}")
     if len(log.ledger):
         columns = ("", "read", "used", "left out")
-        out.print(console.table("samples in the log", columns, _books(log), text=(0, 3), wrapping=(3,)))
+        out.print(console.table("samples in the log", columns, _ledger_rows(log), text=(0, 3), wrapping=(3,)))
     if log.reference is not None:
         console.line(f"against     {log.reference.name}, {replays.judged_s:.1f} s of it judged")
     rows = [_row(replayed) for replayed in replays.replays]
@@ -178,7 +178,7 @@ def print_report(replays: Replays) -> None:
         console.line(f"recording   {folder}")
 
 
-def _books(log: RecordedLog) -> list[list[str]]:
+def _ledger_rows(log: RecordedLog) -> list[list[str]]:
     """Rows of the ledger."""
     return [
         [stream, str(entry.read), str(entry.used), ", ".join(f"{n} {reason}" for reason, n in entry.left_out.items())]

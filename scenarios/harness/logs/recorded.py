@@ -55,12 +55,12 @@ class RecordedLog:
 
     rows : shape (N,), MEASURED_DTYPE, times increasing
     name : of the file            sensors : those that the log has samples of
-    reference : or None           repairs : what was repaired and how often, a line each
+    reference : or None           repairs : what was repaired and how often, one line each
     place : latitude and longitude of the origin of positions, degrees, if known
     known : what the log says about the instruments, by the names of `estimator.instruments.PROPERTIES`, and about
             parameters of single estimators
     ledger : how many samples of the file were read, used and left out
-    notes : further remarks, a line each
+    notes : further remarks, one line each
     on_ground : mean inertial sample at rest before the log, if the log starts in the air and holds one
     """
 

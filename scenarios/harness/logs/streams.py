@@ -115,10 +115,10 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
     ------
     LogError      one line with the file, the message and the column
     """
-    books = _Books(Ledger(), repairs)
-    rows, source, after_gap = _inertial(path, messages, books)
+    account = _Account(Ledger(), repairs)
+    rows, source, after_gap = _inertial(path, messages, account)
     known = {"imu_rate_hz": Known(1.0 / float(np.median(np.diff(rows["t_s"]))), "log", messages.inertial.name)}
-    ticks = _Ticks(rows, after_gap, books)
+    ticks = _Ticks(rows, after_gap, account)
     place = _put_fixes(ticks, messages.fixes, known)
     if (field := ticks.put("magnetometer", messages.magnetic, "mag_new")) is not None:
         rows["mag_b_ut"] = np.nan_to_num(field)
@@ -126,11 +126,11 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
         rows["airspeed_m_s"] = np.nan_to_num(airspeed[:, 0])
     height = ticks.put("barometer", messages.height, None)
     rows["baro_height_m"] = np.nan if height is None else height[:, 0]
-    reference = _reference(path, messages, rows["t_s"], after_gap, books)
+    reference = _reference(path, messages, rows["t_s"], after_gap, account)
     known |= {name: entry for name, entry in messages.known.items() if entry is not None}
     sensors = properties.sensors(rows)
-    log = RecordedLog(rows, path.name, sensors, reference, tuple(repairs), place, known, books.ledger)
-    log = checks.judged(log, source, books.ledger)
+    log = RecordedLog(rows, path.name, sensors, reference, tuple(repairs), place, known, account.ledger)
+    log = checks.judged(log, source, account.ledger)
     for stream, new in _HAS.items():
         if stream in log.ledger:
             log.ledger.use(stream, int(np.sum(log.rows[new] > 0)))
@@ -139,7 +139,7 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
 
 
 @dataclass(frozen=True, slots=True)
-class _Books:
+class _Account:
     """The records of what was left out and what was repaired."""
 
     ledger: Ledger
@@ -182,16 +182,18 @@ def _wild(t_s: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(t_s - median_filter(t_s, 5, mode="reflect")) > far)
 
 
-def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[Any], checks.Source, NDArray[np.bool_]]:
+def _inertial(
+    path: Path, messages: Messages, account: _Account
+) -> tuple[NDArray[Any], checks.Source, NDArray[np.bool_]]:
     """Rows with the inertial samples, how the log names a place in it, and the rows after a gap."""
     stream = messages.inertial
-    good = books.open("imu", stream)
-    books.leave_out_far("imu", good, stream)
+    good = account.open("imu", stream)
+    account.leave_out_far("imu", good, stream)
     number = np.flatnonzero(good) + 1
     source = checks.Source(path, messages.names, lambda k: f"{stream.name} {number[k]}")
     stream = replace(stream, t_s=stream.t_s[good], values=stream.values[good])
     by_name = dict(zip(INERTIAL, stream.values.T, strict=True))
-    keep = checks.kept(stream.t_s, by_name, source, books.repairs, books.ledger)
+    keep = checks.kept(stream.t_s, by_name, source, account.repairs, account.ledger)
     rows = np.zeros(len(keep), MEASURED_DTYPE)
     rows["t_s"] = stream.t_s[keep]
     usual_s = float(np.median(np.diff(rows["t_s"]))) if len(rows) > 1 else 0.0
@@ -200,7 +202,7 @@ def _inertial(path: Path, messages: Messages, books: _Books) -> tuple[NDArray[An
         raise LogError(f"{path}: {why}{messages.remedy and f': {messages.remedy}'}")
     if len(rows) < 2:
         raise source.refusal(None, "time", "a log of one row")
-    rows["dt_s"] = _intervals(rows["t_s"], messages.dt_s[good][keep], stream.name, books.repairs)
+    rows["dt_s"] = _intervals(rows["t_s"], messages.dt_s[good][keep], stream.name, account.repairs)
     rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(stream.values[keep], 2)
     return rows, source, gaps.missing(rows["t_s"], np.full(len(rows), usual_s))
 
@@ -224,31 +226,31 @@ def _intervals(t_s: Array, dt_s: Array, name: str, repairs: list[str]) -> Array:
 class _Ticks:
     """The rows, and messages put into them as they arrived."""
 
-    def __init__(self, rows: NDArray[Any], after_gap: NDArray[np.bool_], books: _Books) -> None:
-        self.rows, self.after_gap, self.books = rows, after_gap, books
+    def __init__(self, rows: NDArray[Any], after_gap: NDArray[np.bool_], account: _Account) -> None:
+        self.rows, self.after_gap, self.account = rows, after_gap, account
         self.most_s = gaps.LONG * float(np.median(np.diff(rows["t_s"])))  # from arrival to the end of the tick
 
     def placed(self, name: str, stream: Stream) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Messages that are used, by their number in the stream, and the row of each; in order of time."""
-        books, t_s, rows_s = self.books, stream.t_s, self.rows["t_s"]
-        good = books.open(name, stream)
+        account, t_s, rows_s = self.account, stream.t_s, self.rows["t_s"]
+        good = account.open(name, stream)
         needed = stream.values[:, : stream.values.shape[1] - stream.optional]
         broken = ~(np.isfinite(t_s) & np.isfinite(needed).all(axis=1))
-        if n := books.leave_out(name, good, broken, NO_NUMBER):
-            books.repairs.append(f"{stream.name}: {n} without a number left out")
-        books.leave_out_far(name, good, stream)
+        if n := account.leave_out(name, good, broken, NO_NUMBER):
+            account.repairs.append(f"{stream.name}: {n} without a number left out")
+        account.leave_out_far(name, good, stream)
         kept = np.flatnonzero(good)
         if late := np.count_nonzero(np.diff(t_s[kept]) < 0.0):
-            books.repairs.append(f"{stream.name}: {late} out of order, sorted")
+            account.repairs.append(f"{stream.name}: {late} out of order, sorted")
         at = np.searchsorted(rows_s, np.where(good, t_s, 0.0))
         row = np.minimum(at, len(rows_s) - 1)
         early = t_s < rows_s[row] - self.most_s
-        books.leave_out(name, good, (at == len(rows_s)) | ((at == 0) & early), OUTSIDE)
-        books.leave_out(name, good, self.after_gap[row] & early, IN_GAP)
+        account.leave_out(name, good, (at == len(rows_s)) | ((at == 0) & early), OUTSIDE)
+        account.leave_out(name, good, self.after_gap[row] & early, IN_GAP)
         kept = np.flatnonzero(good)
         kept = kept[np.argsort(t_s[kept], kind="stable")]
         last = np.append(np.diff(at[kept]) > 0, True)[: len(kept)]
-        books.ledger.leave_out(name, int(np.sum(~last)), REPLACED)
+        account.ledger.leave_out(name, int(np.sum(~last)), REPLACED)
         return kept[last], at[kept[last]]
 
     def put(self, name: str, stream: Stream | None, new: str | None) -> Array | None:
@@ -261,7 +263,7 @@ class _Ticks:
         if new is not None:
             self.rows[new] = arrived
         else:
-            self.books.ledger.use(name, int(arrived.sum()))
+            self.account.ledger.use(name, int(arrived.sum()))
         last = np.cumsum(arrived)  # how many so far
         return np.vstack((np.full(stream.values.shape[1], np.nan), stream.values[message]))[last]
 
@@ -304,31 +306,33 @@ def _holds(rows: NDArray[Any], fixes: Stream) -> NDArray[np.bool_]:
 
 
 def _reference(
-    path: Path, messages: Messages, t_s: Array, after_gap: NDArray[np.bool_], books: _Books
+    path: Path, messages: Messages, t_s: Array, after_gap: NDArray[np.bool_], account: _Account
 ) -> Reference | None:
     """The attitude at the times of the rows, interpolated; None if none was logged."""
     stream = messages.attitude
     if stream is None or not len(stream.t_s):
         return None
-    good = books.open("reference", stream)
-    books.leave_out("reference", good, ~(np.isfinite(stream.t_s) & np.isfinite(stream.values).all(axis=1)), NO_ATTITUDE)
-    books.leave_out_far("reference", good, stream)
+    good = account.open("reference", stream)
+    account.leave_out(
+        "reference", good, ~(np.isfinite(stream.t_s) & np.isfinite(stream.values).all(axis=1)), NO_ATTITUDE
+    )
+    account.leave_out_far("reference", good, stream)
     times, first = np.unique(stream.t_s[good], return_index=True)
-    books.ledger.leave_out("reference", int(good.sum()) - len(times), REPEATED)
+    account.ledger.leave_out("reference", int(good.sum()) - len(times), REPEATED)
     R_eb = attitudes.at_times(times, stream.values[good][first].reshape(-1, 3, 3), t_s)
     known = np.isfinite(R_eb).all(axis=(1, 2))
     used = np.zeros(len(times), np.bool_)
     if known.any():
         after = np.clip(np.searchsorted(times, t_s[known]), 1, len(times) - 1)
         used[after] = used[after - 1] = True  # used to interpolate between
-    books.ledger.use("reference", int(used.sum()))
+    account.ledger.use("reference", int(used.sum()))
     unused = ~used
     near = np.diff(times) <= LONGEST_GAP_S
     alone = ~(np.append(near, False) | np.insert(near, 0, False))[: len(times)]
     row = np.searchsorted(t_s, times)
     gap = np.append(after_gap, False)[row]
-    books.leave_out("reference", unused, (times < t_s[0]) | (times > t_s[-1]), OUTSIDE)
-    books.leave_out("reference", unused, gap, IN_GAP)
-    books.leave_out("reference", unused, alone, ALONE)
-    books.leave_out("reference", unused, np.ones(len(times), np.bool_), NO_ROW)
+    account.leave_out("reference", unused, (times < t_s[0]) | (times > t_s[-1]), OUTSIDE)
+    account.leave_out("reference", unused, gap, IN_GAP)
+    account.leave_out("reference", unused, alone, ALONE)
+    account.leave_out("reference", unused, np.ones(len(times), np.bool_), NO_ROW)
     return Reference(R_eb, messages.kind, f"{stream.name} in {path.name}")
