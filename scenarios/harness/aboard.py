@@ -15,7 +15,8 @@ from typing import Any
 from estimator.blocks.calibration import Calibration
 from estimator.instruments import Instruments, Known
 from scenarios.harness.config import FlightConfig
-from scenarios.harness.plugins import Equipped, Maker, equipped, params_of
+from scenarios.harness.equipping import Equipped, equipped, params_of
+from scenarios.harness.plugins import Maker
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
 from sim.power_up import field_on_turn_table
 from sim.sensors.fitting import SuiteParams

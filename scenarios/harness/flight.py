@@ -16,16 +16,9 @@ from scenarios.harness.aboard import equipped_estimator, instruments_of
 from scenarios.harness.config import FlightConfig, InFlightStart, fitted_suite, overridden, resolve
 from scenarios.harness.config.faults import parse_fault
 from scenarios.harness.config.plant import build_plant
+from scenarios.harness.equipping import Equipped, equipped_autopilot, heading_reference_of, learnt
 from scenarios.harness.own_files import library_named
-from scenarios.harness.plugins import (
-    Equipped,
-    Maker,
-    PluginError,
-    equipped_autopilot,
-    heading_reference_of,
-    learnt,
-    maker_name,
-)
+from scenarios.harness.plugins import Maker, PluginError, maker_name
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario, ScriptFailed
 from sim.clock import Rates

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from estimator.params import PARAMETERS
-from scenarios.harness import plugins
+from scenarios.harness import equipping, plugins
 from sim.params import dotted_fields, unit_of
 
 _NOT_SET = ("params", "instruments")  # arguments of a constructor that ``--set`` does not change
@@ -59,11 +59,11 @@ def estimator_parameters(spec: str | plugins.Maker) -> list[Parameter]:
     """
     if isinstance(spec, str) and spec in plugins.estimators() and spec in PARAMETERS:
         return _of_dataclass(_registered(spec))
-    estimator = plugins.load_estimator(spec) if isinstance(spec, str) else plugins.equipped(spec).code
-    params = plugins.params_of(spec, estimator)
+    estimator = equipping.load_estimator(spec) if isinstance(spec, str) else equipping.equipped(spec).code
+    params = equipping.params_of(spec, estimator)
     found = _of_dataclass(params) if params is not None else []
     arguments = _arguments(type(estimator))
-    settable = plugins.parameters_of(spec) if isinstance(spec, str) else set(arguments)
+    settable = equipping.parameters_of(spec) if isinstance(spec, str) else set(arguments)
     texts = documented(type(estimator))
     others = [name for name in (*arguments, *sorted(settable - arguments.keys())) if name in settable]
     listed = {parameter.name for parameter in found}

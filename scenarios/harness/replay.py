@@ -25,10 +25,11 @@ from estimator.interface import G_M_S2, Array, AttitudeEstimator, ImuSample, Mea
 from estimator.rotation import heading_error_rad, inclination_error_rad, rotation_error_rad
 from scenarios.harness.cli import console
 from scenarios.harness.config import literal
+from scenarios.harness.equipping import Equipped, equipped, heading_reference_of, learnt
 from scenarios.harness.logs.recorded import RecordedLog
 from scenarios.harness.logs.validity import INTERVALS, LONGEST_S, latest
 from scenarios.harness.metrics import STEEPEST_R_ZX, highest, p95, rms
-from scenarios.harness.plugins import Equipped, Maker, PluginError, equipped, heading_reference_of, learnt, short_name
+from scenarios.harness.plugins import Maker, PluginError, short_name
 from sim.events import events_of
 from sim.flight_code import FlightCodeFailed, blaming, estimate_of, record_estimates
 from sim.log import Event, Flight, Log, Outcome, Phase

@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from scenarios.harness import plugins
+from scenarios.harness.equipping import parameters_of
 from scenarios.harness.own_files import library_named
-from scenarios.harness.plugins import Maker, parameters_of, short_name
+from scenarios.harness.plugins import Maker, short_name
 from sim.outside.wording import brief
 from sim.params import near_misses
 

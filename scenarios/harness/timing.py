@@ -9,7 +9,7 @@ import numpy as np
 
 from estimator.instruments import Instruments
 from estimator.interface import AttitudeEstimator, Measurements
-from scenarios.harness.plugins import equipped
+from scenarios.harness.equipping import equipped
 from scenarios.harness.verdict import FAILED
 from sim.outside.blame import home_of, theirs
 

@@ -12,8 +12,8 @@ from estimator import ESTIMATORS
 from estimator.instruments import BOOLEAN, PROPERTIES, Instruments, Known
 from scenarios.harness.commands import compare
 from scenarios.harness.config import override
+from scenarios.harness.equipping import equipped, equipped_autopilot
 from scenarios.harness.flight import fly_scenario, prepare, prepare_config
-from scenarios.harness.plugins import equipped, equipped_autopilot
 from scenarios.harness.registry import find
 from scenarios.harness.settings import shared_settings
 from sim.params import dotted_fields

@@ -13,7 +13,7 @@ import pytest
 
 from estimator.interface import MEASURED_DTYPE, ImuSample, Measurements
 from estimator.rotation import exp
-from scenarios.harness.plugins import load_estimator
+from scenarios.harness.equipping import load_estimator
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "c_estimators.md").read_text(encoding="utf-8")

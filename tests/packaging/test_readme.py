@@ -20,7 +20,7 @@ import pytest
 import wingslevel as wl
 from estimator import ESTIMATORS
 from estimator.instruments import PROPERTIES, Instruments, Known
-from scenarios.harness import plugins
+from scenarios.harness import equipping
 from scenarios.harness.cli.app import run
 from scenarios.harness.commands.compare import LETTERS
 from scenarios.harness.registry import find
@@ -232,7 +232,7 @@ def test_estimators_page_has_a_row_for_each_with_what_it_uses() -> None:
     rows = dict(re.findall(r"^\| `(\w+)` \| ([GAPMV]+) \| ", page, re.M))
     assert rows.keys() == ESTIMATORS.keys()
     for name in ESTIMATORS:
-        uses = plugins.load_estimator(name).uses  # type: ignore[attr-defined]
+        uses = equipping.load_estimator(name).uses  # type: ignore[attr-defined]
         assert rows[name] == "".join(letter for what, letter in LETTERS.items() if what in uses), name
 
 
@@ -257,7 +257,7 @@ def test_instruments_page_shows_an_estimator_that_is_given_what_it_asks_for() ->
     exec(source, shown)
     shown["Mine"].update = lambda self, m: None
     record = Instruments({"gps_latency_s": Known(0.2, "data sheet"), "use_airspeed": Known(True, "data sheet")})
-    mine = plugins.equipped(shown["Mine"], record).code
+    mine = equipping.equipped(shown["Mine"], record).code
     assert (mine.latency_s, mine.has_airspeed) == (0.2, True)
 
 

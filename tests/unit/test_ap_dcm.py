@@ -12,7 +12,7 @@ from estimator.ap_dcm.wind import learn_wind
 from estimator.compiler.jit import kernel
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
 from estimator.rotation import heading_error_rad, heading_rad, inclination_error_rad
-from scenarios.harness.plugins import equipped
+from scenarios.harness.equipping import equipped
 from scenarios.harness.replay import make
 
 G_M_S2 = 9.80665

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 from autopilot.airframes import AutopilotParams, params_of
-from autopilot.dcm import _SETPOINT, _PARAMS, _STATE, _write
+from autopilot.dcm import _PARAMS, _SETPOINT, _STATE, _write
 from autopilot.energy import (
     EnergyParams,
     believe_airspeed,

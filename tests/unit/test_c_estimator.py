@@ -19,10 +19,11 @@ from estimator.interface import MEASURED_DTYPE, Health, ImuSample, Measurements
 from scenarios.harness import c_library, logs
 from scenarios.harness.c_library import ESTIMATE, MEASUREMENTS
 from scenarios.harness.cli.app import run
+from scenarios.harness.equipping import equipped, load_estimator, parameters_of
 from scenarios.harness.flight import fly_scenario, prepare
 from scenarios.harness.gate import sources
 from scenarios.harness.parameters import Parameter, estimator_parameters
-from scenarios.harness.plugins import PluginError, equipped, load_estimator, parameters_of, short_name
+from scenarios.harness.plugins import PluginError, short_name
 from scenarios.harness.registry import find
 from scenarios.harness.replay import replay
 from sim import recording

@@ -13,8 +13,8 @@ from estimator import complementary
 from estimator.complementary import Complementary, ComplementaryParams
 from estimator.interface import MEASURED_DTYPE, Health, ImuSample
 from estimator.rotation import heading_error_rad, inclination_error_rad
+from scenarios.harness.equipping import equipped
 from scenarios.harness.flight import fly_scenario
-from scenarios.harness.plugins import equipped
 from scenarios.harness.registry import find
 
 G, DT = 9.80665, 0.02

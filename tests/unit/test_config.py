@@ -17,8 +17,8 @@ from scenarios.harness.config import (
     resolve,
 )
 from scenarios.harness.config.air import Wind, parse_wind
+from scenarios.harness.equipping import equipped
 from scenarios.harness.flight import prepare_config
-from scenarios.harness.plugins import equipped
 from scenarios.harness.registry import find
 from sim.clock import Rates
 from sim.params import changed

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness import plugins
+from scenarios.harness import equipping
 from scenarios.harness.cli.app import run
 from scenarios.harness.cli.values import estimators as completed_estimators
 from scenarios.harness.cli.values import scenarios as completed_scenarios
@@ -209,7 +209,7 @@ def test_broken_or_misspelt_is_one_line_and_exit_code_2(refused, arguments: tupl
 @pytest.mark.usefixtures("package")
 def test_name_that_is_taken_means_ours_and_says_so(capsys) -> None:
     """The flight is that of wingslevel's own estimator; one line says which package is ignored."""
-    assert type(plugins.load_estimator("premerlani")).__module__ == "estimator.premerlani"
+    assert type(equipping.load_estimator("premerlani")).__module__ == "estimator.premerlani"
     run(["fly", "storm", "--no-rerun"])
     assert capsys.readouterr().err.count("is ignored: wingslevel has one of that name") == 1
 

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.harness import plugins
 from scenarios.harness.cli.app import run
-from scenarios.harness.plugins import load_estimator
+from scenarios.harness.equipping import load_estimator
 from sim import recording
 from sim.log import Outcome
 from sim.outside import entry_points

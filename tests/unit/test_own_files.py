@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from scenarios.harness.cli.app import run
+from scenarios.harness.equipping import load_estimator
 from scenarios.harness.own_files import module_of_file
-from scenarios.harness.plugins import load_estimator
 from scenarios.harness.registry import find
 from sim import recording
 from sim.log import Outcome
@@ -42,7 +42,7 @@ class Mine:
     def update(self, m):
         return AttitudeEstimate(np.eye(3))
 """
-BY_NAME = "from scenarios.harness.plugins import load_estimator; print(load_estimator('{file}:Mine').value)"
+BY_NAME = "from scenarios.harness.equipping import load_estimator; print(load_estimator('{file}:Mine').value)"
 BY_IMPORT = "import sys; sys.path.insert(0, '{folder}'); import own; print(own.Mine.value)"
 SCENARIO = """
 from autopilot.interface import Mode, Setpoint

@@ -10,7 +10,7 @@ import pytest
 
 from estimator import ESTIMATORS
 from estimator.params import PARAMETERS
-from scenarios.harness import plugins
+from scenarios.harness import equipping, plugins
 from scenarios.harness.parameters import default_text, estimator_parameters, update_page
 
 ROOT = Path(__file__).parents[2]
@@ -90,9 +90,9 @@ def test_each_parameter_says_unit_meaning_and_what_a_change_does(name: str) -> N
 @pytest.mark.parametrize("name", sorted(ESTIMATORS))
 def test_names_and_defaults_are_those_of_the_estimator(name: str) -> None:
     """What is read without the compiler is what the estimator flies with."""
-    code = plugins.load_estimator(name)
+    code = equipping.load_estimator(name)
     found = estimator_parameters(name)
-    assert {p.name for p in found} == plugins.parameters_of(name)
+    assert {p.name for p in found} == equipping.parameters_of(name)
     assert len({p.name for p in found}) == len(found)
     for parameter in found:
         value = code.params  # type: ignore[attr-defined]

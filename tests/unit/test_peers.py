@@ -176,7 +176,8 @@ def test_peer_rejects_and_counts_what_is_no_measurement(make):
 
 def test_missing_package_is_one_line_that_says_what_to_install(monkeypatch):
     """The extra is optional: without it the name is refused before anything is flown."""
-    from scenarios.harness.plugins import PluginError, load_estimator
+    from scenarios.harness.equipping import load_estimator
+    from scenarios.harness.plugins import PluginError
 
     monkeypatch.setitem(sys.modules, "vqf", None)
     with pytest.raises(PluginError, match=r'peer_vqf.*pip install "wingslevel\[peers\]"') as told:

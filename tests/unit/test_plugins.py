@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.harness import plugins
+from scenarios.harness import equipping, plugins
 
 FINE = """
 class Fine:
@@ -32,7 +32,7 @@ def file_of(tmp_path: Path):
 def refusal(spec: str) -> str:
     """The one line with which an estimator is refused."""
     with pytest.raises(plugins.PluginError) as refused:
-        plugins.load_estimator(spec)
+        equipping.load_estimator(spec)
     message = str(refused.value)
     assert "\n" not in message
     return message
@@ -41,33 +41,33 @@ def refusal(spec: str) -> str:
 @pytest.mark.parametrize("name", plugins.ESTIMATORS)
 def test_load_estimator_registered_gives_new_object(name: str) -> None:
     """No state is shared between flights: each call makes another object."""
-    assert plugins.load_estimator(name) is not plugins.load_estimator(name)
+    assert equipping.load_estimator(name) is not equipping.load_estimator(name)
 
 
 def test_load_estimator_from_file_gives_its_class(file_of) -> None:
     """A class in a file of one's own is found by its path."""
-    estimator = plugins.load_estimator(f"{file_of(FINE)}:Fine")
+    estimator = equipping.load_estimator(f"{file_of(FINE)}:Fine")
     assert type(estimator).__name__ == "Fine"
-    assert plugins.heading_reference_of(estimator) == "nose"
+    assert equipping.heading_reference_of(estimator) == "nose"
 
 
 def test_load_estimator_from_file_imports_its_neighbour(file_of) -> None:
     """A file may import the files beside it."""
     file_of("GAIN = 3", "neighbour_of_own.py")
     path = file_of(f"from neighbour_of_own import GAIN\n{FINE}    gain = GAIN\n")
-    assert plugins.load_estimator(f"{path}:Fine").gain == 3
+    assert equipping.load_estimator(f"{path}:Fine").gain == 3
 
 
 def test_load_estimator_from_module_in_working_directory_is_found(file_of, monkeypatch) -> None:
     """The console script, unlike ``python -m``, does not look in the working directory by itself."""
     monkeypatch.chdir(file_of(FINE, "module_of_own.py").parent)
-    assert type(plugins.load_estimator("module_of_own:Fine")).__module__ == "module_of_own"
+    assert type(equipping.load_estimator("module_of_own:Fine")).__module__ == "module_of_own"
 
 
 def test_load_estimator_without_optional_parts_is_accepted(file_of) -> None:
     """Only `update` is required; the heading reference is the course where none is named."""
-    estimator = plugins.load_estimator(f"{file_of('class Bare:' + chr(10) + ' def update(self, m): ...')}:Bare")
-    assert plugins.heading_reference_of(estimator) == "course"
+    estimator = equipping.load_estimator(f"{file_of('class Bare:' + chr(10) + ' def update(self, m): ...')}:Bare")
+    assert equipping.heading_reference_of(estimator) == "course"
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_load_autopilot_that_asks_is_told_the_heading_reference(file_of) -> None
         "    def __init__(self, heading_reference='course'): self.reference = heading_reference\n"
         "    def update(self, estimate, m, setpoint): ...\n"
     )
-    assert plugins.load_autopilot(f"{path}:Pilot", "nose").reference == "nose"
+    assert equipping.load_autopilot(f"{path}:Pilot", "nose").reference == "nose"
 
 
 def test_load_autopilot_that_asks_is_told_the_aircraft(file_of) -> None:
@@ -133,19 +133,19 @@ def test_load_autopilot_that_asks_is_told_the_aircraft(file_of) -> None:
         "    def __init__(self, aircraft): self.aircraft = aircraft\n"
         "    def update(self, estimate, m, setpoint): ...\n"
     )
-    assert plugins.load_autopilot(f"{path}:Pilot", aircraft="gentle_lady").aircraft == "gentle_lady"
+    assert equipping.load_autopilot(f"{path}:Pilot", aircraft="gentle_lady").aircraft == "gentle_lady"
 
 
 def test_load_autopilot_for_an_aircraft_that_it_has_no_gains_for_is_refused() -> None:
     """One line with those that it has."""
     with pytest.raises(plugins.PluginError, match=r"'glider': the autopilot has no gains .* endurance, gentle_lady$"):
-        plugins.load_autopilot("dcm", aircraft="glider")
+        equipping.load_autopilot("dcm", aircraft="glider")
 
 
 def test_load_autopilot_with_the_update_of_an_estimator_is_refused(file_of) -> None:
     """An estimator named in the place of an autopilot is noticed."""
     with pytest.raises(plugins.PluginError, match=r"must be update\(estimate, measurements, setpoint\)"):
-        plugins.load_autopilot(f"{file_of(FINE)}:Fine")
+        equipping.load_autopilot(f"{file_of(FINE)}:Fine")
 
 
 @dataclass(frozen=True)
@@ -163,5 +163,5 @@ class _TakesNothing:
 def test_parameters_of_a_class_that_takes_none_are_refused_in_one_line():
     """A person's own class has parameters that it cannot be given."""
     with pytest.raises(ValueError, match=r"its class must take its params as an argument"):
-        plugins.equipped(_TakesNothing, settings={"gain": 2.0})
-    assert plugins.equipped(_TakesNothing).code.params.gain == 1.0
+        equipping.equipped(_TakesNothing, settings={"gain": 2.0})
+    assert equipping.equipped(_TakesNothing).code.params.gain == 1.0

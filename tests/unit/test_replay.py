@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from estimator.instruments import PROPERTIES, Known
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate
 from scenarios.harness import logs
+from scenarios.harness.equipping import equipped
 from scenarios.harness.flight import fly_scenario
 from scenarios.harness.logs.recorded import RecordedLog, Reference
-from scenarios.harness.plugins import equipped
 from scenarios.harness.registry import find
 from scenarios.harness.replay import Window, as_flight, at_rest, flying, judged_rows, make, replay, score, why_none
 from sim import recording

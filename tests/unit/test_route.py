@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot.airframes import AutopilotParams
-from autopilot.dcm import _SETPOINT, _PARAMS, _STATE, _write
+from autopilot.dcm import _PARAMS, _SETPOINT, _STATE, _write
 from autopilot.energy import EnergyParams
 from autopilot.guidance import GuidanceParams, gps_age, unseen_turn
 from autopilot.interface import Mode, Setpoint, Waypoint

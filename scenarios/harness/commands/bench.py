@@ -22,8 +22,8 @@ from estimator.interface import AttitudeEstimator
 from scenarios.harness.checks import Row
 from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
+from scenarios.harness.equipping import equipped, equipped_autopilot, heading_reference_of
 from scenarios.harness.gate import guard
-from scenarios.harness.plugins import equipped, equipped_autopilot, heading_reference_of
 from scenarios.harness.timing import Cost, NotTimed, cost_of, least_ns
 from scenarios.harness.verdict import FAILED, SIMULATION_FAILED
 from sim.aeroplane.jsbsim_plant import JsbsimPlant

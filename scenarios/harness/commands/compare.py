@@ -32,13 +32,14 @@ from scenarios.harness.commands.comparison import (
 )
 from scenarios.harness.commands.listing import note_ignored
 from scenarios.harness.config import FlightConfig, is_field
+from scenarios.harness.equipping import load_estimator, uses_of
 from scenarios.harness.flight import Prepared, fly_scenario, prepare_config
 from scenarios.harness.flight import prepare as prepare_flight
 from scenarios.harness.gate import guard
 from scenarios.harness.gate.preparing import in_time
 from scenarios.harness.gate.workers import fly_each, processors
 from scenarios.harness.metrics import heading_error_deg, inclination_error_deg
-from scenarios.harness.plugins import PluginError, load_estimator, uses_of
+from scenarios.harness.plugins import PluginError
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.seeds import parse_seeds

@@ -299,13 +299,13 @@ def parameters() -> frozenset[str]:
     """Names of the parameters of all registered estimators that can be loaded."""
     from dataclasses import is_dataclass
 
-    from scenarios.harness import plugins
+    from scenarios.harness import equipping, plugins
     from sim.params import dotted_fields
 
     found: set[str] = set()
     for name in plugins.estimators():
         try:
-            params = plugins.params_of(name, plugins.load_estimator(name))
+            params = equipping.params_of(name, equipping.load_estimator(name))
         except ValueError:  # its package is not installed
             continue
         if is_dataclass(params):
