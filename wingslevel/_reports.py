@@ -127,10 +127,11 @@ def sensors(name: AnyPath | None = None, *, progress: Progress = False) -> dict[
         return listed("suites")
     from scenarios.harness.commands import sensor_names
     from scenarios.harness.commands import sensors as command
+    from sim.sensors import trial
 
     with quietly(), progress_of(progress, "lying still", "axis-hours") as advance:
         about = sensor_names.subject(os.fspath(name))
-        command.check_rates(about, os.fspath(name))
+        trial.check_rates(about.devices, os.fspath(name))
         made = command.make(about, lambda done, total: advance(done, total))
 
     def draw(path: Path) -> None:
@@ -154,6 +155,7 @@ def bench(
     """
     from scenarios.harness import lent
     from scenarios.harness.commands import bench as command
+    from scenarios.harness.timing import NotTimed
 
     if not (2.0 <= seconds <= 3600.0 and 3 <= repeats <= 1000):
         raise WingslevelError(f"seconds = {seconds!r}, repeats = {repeats!r}: must be 2 to 3600 s, and 3 to 1000")
@@ -162,7 +164,7 @@ def bench(
     with quietly(), lent.lend(objects(found)), progress_of(progress, "measuring", "pairs") as advance:
         try:
             speed = command.measure(name, float(seconds), int(repeats), advance)
-        except command.NotTimed as problem:
+        except NotTimed as problem:
             raise WingslevelError(str(problem)) from problem
     return Report(f"bench {name}", speed.to_json(), speed.passed)
 

@@ -8,12 +8,13 @@ GPS, or with a limit of 0), after a settling time.  Against firmware every row c
 from the first sample.
 """
 
+import copy
 import math
 import operator
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,7 @@ SCORES = (
     "inclination_rms_deg", "inclination_p95_deg", "inclination_max_deg", "heading_rms_deg",
     "rotation_rms_deg", "rotation_max_deg",
 )  # fmt: skip
+_NO_SCORES = dict.fromkeys(SCORES, math.nan)
 MOST_REFUSED = 100  # kinds of rejected samples that an estimator may report
 SHARE_S, REPEATS = 0.3, 7  # the least time of several runs counts, within this total
 
@@ -95,15 +97,13 @@ class Replayed:
     def to_json(self) -> dict[str, Any]:
         """The numbers, named with their units; None for those that could not be measured."""
         numbers = {**self.scores, "ns_per_update": self.ns_per_update}
-        plain: dict[str, Any] = {name: v if math.isfinite(v) else None for name, v in numbers.items()}
-        failure = {"failure": self.failure} if self.failure else {}
         return {
-            **plain,
+            **{name: value if math.isfinite(value) else None for name, value in numbers.items()},
             "rejected": self.rejected,
             "refused": dict(self.refused),
             "heading_reference": self.heading_reference,
             "known": to_json(self.known),
-            **failure,
+            **({"failure": self.failure} if self.failure else {}),
         }
 
 
@@ -149,28 +149,24 @@ def replay(
     flown = Log.empty(len(log.rows))
     _truth_of(log, flown.truth)
     flown.measured[:] = log.rows
-    failure, ns_per_update, reported = "", math.nan, _Reported(known, None, {})
+    reports: dict[str, Any] = {"known": known, "rejected": None}
+    failure, ns_per_update = "", math.nan
     try:
         ns_per_update = _run(estimator, on_ground, log.rows, first, flown.flown, advance)
     except FlightCodeFailed as failed:
         failure = str(failed)
     try:
-        reported = _reported(estimator, known, float(log.rows["t_s"][-1]))
+        reports = _reports(estimator, known, float(log.rows["t_s"][-1]))
     except (FlightCodeFailed, PluginError) as failed:
         failure = failure or str(failed)
     judged = judged_rows(log, window, first)
-    scores = score(flown.flown["R_eb"], log, judged) if not failure else dict.fromkeys(SCORES, math.nan)
-    ns_per_update = math.nan if failure else ns_per_update
-    return Replayed(
-        short_name(spec), reference, flown, first, ns_per_update, reported.rejected, scores, failure, reported.known,
-        reported.refused,
-    )  # fmt: skip
+    scores, spent = (_NO_SCORES, math.nan) if failure else (score(flown.flown["R_eb"], log, judged), ns_per_update)
+    return Replayed(short_name(spec), reference, flown, first, spent, scores=scores, failure=failure, **reports)
 
 
 def gone(spec: str | Maker, failure: str) -> Replayed:
     """The result for an estimator that ended the process: no rows, and the failure."""
-    scores = dict.fromkeys(SCORES, math.nan)
-    return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, scores, failure)
+    return Replayed(short_name(spec), "course", Log.empty(0), 0, math.nan, None, _NO_SCORES, failure)
 
 
 def known_to(log: RecordedLog, withheld: Sequence[str] = ()) -> Instruments:
@@ -184,24 +180,17 @@ def _all_of(withheld: Sequence[str]) -> bool:
     return set(withheld) >= set(PROPERTIES)
 
 
-class _Reported(NamedTuple):
-    """What an estimator reports after a replay."""
-
-    known: Mapping[str, Known]
-    rejected: int | None
-    refused: Mapping[str, int]
-
-
-def _reported(estimator: object, known: Mapping[str, Known], t_s: float) -> _Reported:
-    """What `estimator` reports after its replay; FlightCodeFailed or PluginError if that is invalid."""
-    told = learnt(estimator, known)
+def _reports(estimator: object, known: Mapping[str, Known], t_s: float) -> dict[str, Any]:
+    """Fields of `Replayed` that `estimator` reports; FlightCodeFailed or PluginError if they are invalid."""
+    now_known = learnt(estimator, known)
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, t_s):
         rejected = getattr(estimator, "rejected", None)
         refused = getattr(estimator, "refused", {})
         if not isinstance(refused, Mapping) or len(refused) > MOST_REFUSED:
             raise Refused(f"refused is {shown(refused)}, must be numbers of samples by instrument")
         counts = {printable(str(name)): _count(f"refused[{shown(name)}]", n) for name, n in refused.items()}
-        return _Reported(told, None if rejected is None else _count("rejected", rejected), counts)
+        n_rejected = None if rejected is None else _count("rejected", rejected)
+        return {"known": now_known, "rejected": n_rejected, "refused": counts}
 
 
 def _count(name: str, value: object) -> int:
@@ -252,12 +241,9 @@ def _judged(log: RecordedLog, window: Window, first: int) -> tuple[NDArray[np.bo
     if "gps" in log.sensors and window.airborne_m_s > 0.0:
         judged &= flying(rows, window.airborne_m_s)
         if not judged.any():
+            slow = f"ground speed never above {window.airborne_m_s:g} m/s while there is a reference"
             fastest = float(rows["gps_speed_m_s"][rows["gps_new"] > 0].max(initial=0.0))
-            why = (
-                f"ground speed never above {window.airborne_m_s:g} m/s while there is a reference (fastest fix: "
-                f"{fastest:.1f} m/s); --airborne 0 judges all rows"
-            )
-            return judged, why
+            return judged, f"{slow} (fastest fix: {fastest:.1f} m/s); --airborne 0 judges all rows"
     judged &= np.arange(len(rows)) >= first
     if judged.any():
         judged &= rows["t_s"] > rows["t_s"][np.argmax(judged)] + window.settle_s
@@ -300,7 +286,7 @@ def score(R_eb: Array, log: RecordedLog, judged: NDArray[np.bool_]) -> dict[str,
     The heading is compared with the reference's nose, where its nose is not near the vertical.
     """
     if log.reference is None:
-        return dict.fromkeys(SCORES, math.nan)
+        return _NO_SCORES
     ours, theirs = R_eb[judged], log.reference.R_eb[judged]
     inclination = np.degrees(inclination_error_rad(ours, theirs))
     rotation = np.degrees(rotation_error_rad(ours, theirs))
@@ -376,7 +362,7 @@ def _run(
     rows.flags.writeable = writeable  # kernels are compiled for it
     with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
         replay = getattr(estimator, "replay", None)
-    power_up(estimator, _copied(on_ground))
+    power_up(estimator, copy.deepcopy(on_ground))
     if replay is None:
         began = time.perf_counter()
         for k in range(first, total):
@@ -392,7 +378,7 @@ def _run(
         replay(rows[first : first + 1])  # compiles, if necessary
     spent, least = 0.0, math.inf
     for i in range(REPEATS):
-        power_up(estimator, _copied(on_ground))
+        power_up(estimator, copy.deepcopy(on_ground))
         with blaming(Outcome.ESTIMATOR_FAILED, estimator, began_s):
             began = time.perf_counter()
             estimates = replay(rows[first:])
@@ -407,14 +393,6 @@ def _run(
         flown[first + good] = Log.empty(1).flown[0]
         raise FlightCodeFailed(Outcome.ESTIMATOR_FAILED, estimator, float(rows["t_s"][first + good]), fault)
     return 1e9 * least / (total - first)
-
-
-def _copied(on_ground: ImuSample | None) -> ImuSample | None:
-    if on_ground is None:
-        return None
-    return on_ground._replace(
-        gyro_b_rad_s=np.array(on_ground.gyro_b_rad_s), force_b_m_s2=np.array(on_ground.force_b_m_s2)
-    )
 
 
 def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:

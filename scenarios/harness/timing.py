@@ -8,15 +8,20 @@ from typing import Any
 import numpy as np
 
 from estimator.instruments import Instruments
-from estimator.interface import Measurements
+from estimator.interface import AttitudeEstimator, Measurements
 from scenarios.harness.equipping import equipped
+from scenarios.harness.verdict import FAILED
 from sim.outside.blame import home_of, theirs
 
 REPEATS, MOST_NS = 7, 1_000_000_000
 
 
 class NotTimed(RuntimeError):
-    """An estimator that raised while it was timed."""
+    """A flight that ended early, or flight code that raised, while it was timed; `exit_code` as for a flight."""
+
+    def __init__(self, why: str, exit_code: int = FAILED) -> None:
+        super().__init__(why)
+        self.exit_code = exit_code
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,18 +48,23 @@ def cost(name: str, rows: np.ndarray, instruments: Instruments) -> Cost:
     ------
     NotTimed      the estimator raises
     """
+    estimator = equipped(name, instruments).code
+    with theirs(NotTimed, home_of(estimator)):
+        return cost_of(estimator, rows)
+
+
+def cost_of(estimator: AttitudeEstimator, rows: np.ndarray) -> Cost:
+    """`cost` of an estimator that is powered up; what it raises is passed on."""
     rows = rows.copy()  # an estimator may write into them
     inputs = [Measurements(rows, k) for k in range(len(rows))]
-    estimator = equipped(name, instruments).code
 
     def stream() -> None:
         update = estimator.update
         for m in inputs:
             update(m)
 
-    with theirs(NotTimed, home_of(estimator)):
-        replay, update_ns = getattr(estimator, "replay", None), least_ns(stream) / len(rows)
-        return Cost(update_ns, None if replay is None else least_ns(lambda: replay(rows)) / len(rows))
+    replay, update_ns = getattr(estimator, "replay", None), least_ns(stream) / len(rows)
+    return Cost(update_ns, None if replay is None else least_ns(lambda: replay(rows)) / len(rows))
 
 
 def least_ns(run: Callable[[], Any]) -> float:

@@ -59,15 +59,19 @@ class Airframe:
         return 0.5 * self.density_kg_m3 * self.airspeed_m_s**2 * self.area_m2
 
 
+def _to_stability(linear: LinearModel) -> Array:
+    """R_sb: from body to stability axes."""
+    c, s = math.cos(linear.trim.alpha_rad), math.sin(linear.trim.alpha_rad)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
 def stability_axes(linear: LinearModel) -> Array:
     """A of u v w p q r roll pitch, shape (8, 8), with velocities and rates in stability axes.
 
     The Euler angles remain those of the body.
     """
-    c, s = math.cos(linear.trim.alpha_rad), math.sin(linear.trim.alpha_rad)
-    R_sb = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     T = np.eye(8)
-    T[:3, :3] = T[3:6, 3:6] = R_sb
+    T[:3, :3] = T[3:6, 3:6] = _to_stability(linear)
     return T @ linear.A[:8, :8] @ T.T
 
 
@@ -77,8 +81,7 @@ def coefficients(linear: LinearModel, frame: Airframe) -> dict[str, float]:
     Lift and moments in stability axes, with the thrust as a function of the state.  Lift turns with the flow, the
     forces of the linear model do not; the drag term accounts for that (Nelson, chapter 3).
     """
-    c, s = math.cos(linear.trim.alpha_rad), math.sin(linear.trim.alpha_rad)
-    R_sb = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    R_sb = _to_stability(linear)
     A, speed, qs = stability_axes(linear), frame.airspeed_m_s, frame.pressure_force_n
     moments = (R_sb @ frame.inertia_kg_m2 @ R_sb.T) @ A[3:6]
     controls_force, controls_moment = R_sb @ linear.B[:3], R_sb @ frame.inertia_kg_m2 @ linear.B[3:6]
@@ -116,7 +119,7 @@ def textbook(linear: LinearModel) -> dict[str, Mode]:
         "phugoid": _phugoid(A),
         "roll": Mode("roll", (complex(A[P, P]),)),
         "dutch_roll": _dutch_roll(A),
-        "spiral": Mode("spiral", (complex(_spiral(A)),)),
+        "spiral": _spiral(A),
     }
 
 
@@ -142,11 +145,10 @@ def _dutch_roll(A: Array) -> Mode:
     return _pair("dutch_roll", y_v * n_r - n_v * A[V, R], -(y_v + n_r))  # A[V, R] is Y_r - V
 
 
-def _spiral(A: Array) -> float:
+def _spiral(A: Array) -> Mode:
     """Minus the ratio of the last two coefficients of the characteristic equation of v p r roll."""
-    square = A[np.ix_(ASYMMETRIC, ASYMMETRIC)]
-    *_, before, last = np.poly(square)
-    return float(-last / before)
+    *_, before, last = np.poly(A[np.ix_(ASYMMETRIC, ASYMMETRIC)])
+    return Mode("spiral", (complex(-last / before),))
 
 
 def _pair(name: str, stiffness: float, damping: float) -> Mode:

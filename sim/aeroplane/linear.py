@@ -161,17 +161,12 @@ def _mode(name: str, values: Array) -> Mode:
 def _asymmetric(values: Array, part: Array) -> tuple[Mode, ...]:
     """Roll, Dutch roll and spiral among four roots; `part` [v p r roll, root] are the participations."""
     turning = np.abs(values.imag) > 1e-9
-    slip = part[SIDE_SPEED] + part[YAW_RATE]
-    if turning.sum() == 2:
-        dutch, real = values[turning], np.flatnonzero(~turning)
-        rolls = real[int(np.argmax(part[ROLL_RATE][real]))]
-        spiral = real[real != rolls]
-        return _mode("dutch_roll", dutch), _mode("roll", values[[rolls]]), _mode("spiral", values[spiral])
-    order = np.argsort(-slip) if turning.all() else np.argsort(np.abs(values))[::-1]
     if turning.all():
+        order = np.argsort(-part[SIDE_SPEED] - part[YAW_RATE])
         return _mode("dutch_roll", values[order[:2]]), _mode("roll_spiral", values[order[2:]])
-    # Four real roots: Dutch roll is overdamped, too.
-    rolls = int(np.argmax(part[ROLL_RATE]))
-    spiral = int(order[-1])
-    others = [i for i in range(4) if i not in (rolls, spiral)]
-    return _mode("dutch_roll", values[others]), _mode("roll", values[[rolls]]), _mode("spiral", values[[spiral]])
+    real = np.flatnonzero(~turning)  # four if the Dutch roll is overdamped, too
+    rolls = real[int(np.argmax(part[ROLL_RATE][real]))]
+    rest = real[real != rolls]
+    spiral = rest[int(np.argmin(np.abs(values[rest])))]
+    dutch = [i for i in range(4) if i not in (rolls, spiral)]
+    return _mode("dutch_roll", values[dutch]), _mode("roll", values[[rolls]]), _mode("spiral", values[[spiral]])

@@ -5,6 +5,7 @@ The glide polar, motor off, is computed by angle of attack, because speed is not
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -148,11 +149,9 @@ def _sweep(model: "Model", speeds_m_s: np.ndarray, height_m: float, throttle: fl
     """Straight flight at each possible speed, at a throttle or level (None)."""
     found: list[Trim] = []
     for speed in speeds_m_s:
-        try:
-            near = replace(found[-1], airspeed_m_s=float(speed)) if found else None
+        with suppress(ValueError):
+            near = found[-1] if found else None
             found.append(trim(model, float(speed), height_m, throttle=throttle, guess=near))
-        except ValueError:
-            continue
     return tuple(found)
 
 

@@ -89,10 +89,7 @@ class Fixes:
         return cls(
             t_s=np.where(np.isfinite(rows["gps_t_s"]), rows["gps_t_s"], rows["t_s"]),
             arrival_s=rows["t_s"].copy(),
-            p_e_m=rows["gps_p_e_m"].copy(),
-            v_e_m_s=rows["gps_v_e_m_s"].copy(),
-            course_rad=rows["gps_course_rad"].copy(),
-            speed_m_s=rows["gps_speed_m_s"].copy(),
+            **{name: rows[f"gps_{name}"].copy() for name in ("p_e_m", "v_e_m_s", "course_rad", "speed_m_s")},
             horizontal_acc_m=np.full(n, accuracy.horizontal_m),
             vertical_acc_m=np.full(n, accuracy.vertical_m),
             speed_acc_m_s=np.full(n, accuracy.speed_m_s),
@@ -213,13 +210,11 @@ def geodetic(p_e_m: Array, place: Place) -> Array:
     """
     there = np.full_like(p_e_m, NAN)
     known = np.isfinite(p_e_m[:, :2]).all(axis=1)
-    down_known = np.isfinite(p_e_m[:, 2])
     if known.any():
         n_m, e_m, d_m = p_e_m[known].T
-        there[known] = np.transpose(
-            pymap3d.ned2geodetic(n_m, e_m, np.where(np.isfinite(d_m), d_m, 0.0), *checked(place))
-        )
-    there[~down_known, 2] = NAN
+        d_m = np.where(np.isfinite(d_m), d_m, 0.0)
+        there[known] = np.transpose(pymap3d.ned2geodetic(n_m, e_m, d_m, *checked(place)))
+    there[~np.isfinite(p_e_m[:, 2]), 2] = NAN
     return there
 
 
@@ -296,16 +291,10 @@ def _place(ordered: list[Epoch]) -> Place:
 
 
 def _fixes(times: list[int], ordered: list[Epoch], place: Place, zero_ns: int) -> Fixes:
-    height_m = np.array([e.height_m for e in ordered])
+    latitude_deg, longitude_deg, height_m = np.array([(e.latitude_deg, e.longitude_deg, e.height_m) for e in ordered]).T
     known = np.isfinite(height_m)
-    p_e_m = np.transpose(
-        pymap3d.geodetic2ned(
-            np.array([e.latitude_deg for e in ordered]),
-            np.array([e.longitude_deg for e in ordered]),
-            np.where(known, height_m, place.height_m),  # north and east hardly depend on it
-            *place,
-        )
-    )
+    near_m = np.where(known, height_m, place.height_m)  # north and east hardly depend on it
+    p_e_m = np.transpose(pymap3d.geodetic2ned(latitude_deg, longitude_deg, near_m, *place))
     p_e_m[~known, 2] = NAN
     horizontal, vertical, speed, course = np.array([e.accuracy for e in ordered]).T
     return Fixes(

@@ -13,13 +13,13 @@ References: NMEA 0183 version 2.3 (fields, checksum: exclusive or of all charact
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import date, datetime, time
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from sim.gps_messages import fixes as common
-from sim.gps_messages.fixes import LAUNCH, NAN, NS, START, Epoch, Fixes, Place, Problem, Reading
+from sim.gps_messages.fixes import LAUNCH, NAN, NS, START, Epoch, Fixes, Kind, Place, Problem, Reading
 
 KNOT_M_S: Final = 1852.0 / 3600.0  # by definition
 _MINUTE: Final = 10**7  # units of position in a minute of arc
@@ -138,12 +138,9 @@ def _sentences(data: bytes, problems: list[Problem]) -> tuple[list[_Sentence], i
             if message is None:
                 raise nmea.NMEAMessageError("no checksum, or bytes that are not text")
             found.append(_Sentence(where, name[1].decode(), message))
-        except nmea.NMEAParseError as error:
-            kind = "truncated" if number == len(lines) else "checksum"
-            problems.append(Problem(kind, where, str(error)))  # type: ignore[arg-type]
-        except (nmea.NMEAMessageError, nmea.NMEATypeError) as error:
-            kind = "truncated" if number == len(lines) else "malformed"
-            problems.append(Problem(kind, where, str(error)))  # type: ignore[arg-type]
+        except (nmea.NMEAParseError, nmea.NMEAMessageError, nmea.NMEATypeError) as error:
+            damage: Kind = "checksum" if isinstance(error, nmea.NMEAParseError) else "malformed"
+            problems.append(Problem("truncated" if number == len(lines) else damage, where, str(error)))
     return found, ignored
 
 
@@ -205,11 +202,12 @@ def _dated(groups: list[_Group], start: datetime) -> Iterator[int]:
             step = group.clock_ns - last.clock_ns
             before += 1 if step < -_DAY_NS // 2 else -1 if step > _DAY_NS // 2 else 0
         turns.append(before)
-    said = [(group.day, turn) for group, turn in zip(groups, turns, strict=True)]
-    first = next(((day, turn) for day, turn in said if day is not None), None)
-    base = common.utc_ns(start) // _DAY_NS if first is None else first[0] - first[1]
-    for group, (day, turn) in zip(groups, said, strict=True):
-        base = base if day is None else day - turn
+    days = [
+        None if g.day is None else g.day - turn for g, turn in zip(groups, turns, strict=True)
+    ]  # less the midnights before
+    base = next((day for day in days if day is not None), common.utc_ns(start) // _DAY_NS)
+    for group, day, turn in zip(groups, days, turns, strict=True):
+        base = base if day is None else day
         yield (base + turn) * _DAY_NS + group.clock_ns
 
 
@@ -228,13 +226,6 @@ def _take_rmc(epoch: Epoch, m: Any) -> None:
         return
     _take_position(epoch, m)
     _take_motion(epoch, m.spd, m.cog)
-
-
-def _take_vtg(epoch: Epoch, m: Any) -> None:
-    _take_motion(epoch, m.sogn, m.cogt)
-
-
-_TAKE: Final = {"GGA": _take_gga, "RMC": _take_rmc, "VTG": _take_vtg}
 
 
 def _take_position(epoch: Epoch, m: Any) -> None:
@@ -261,3 +252,10 @@ def _take_motion(epoch: Epoch, speed_kn: Any, course_deg: Any) -> None:
 def _number(value: Any) -> float:
     """A field as a number; NaN if it is empty or not finite."""
     return float(value) if isinstance(value, int | float) and math.isfinite(value) else NAN
+
+
+_TAKE: Final[dict[str, Callable[[Epoch, Any], None]]] = {
+    "GGA": _take_gga,
+    "RMC": _take_rmc,
+    "VTG": lambda epoch, m: _take_motion(epoch, m.sogn, m.cogt),
+}

@@ -113,8 +113,6 @@ def _fix(fixes: Fixes, i: int, there: list[float], *, known: bool) -> dict[str, 
         accuracies = dict.fromkeys(("hAcc", "vAcc", "sAcc"), _UNKNOWN)
         return {"fixType": 0, "invalidLlh": 1, "pDOP": 99.995, "headAcc": _scaled(_UNKNOWN, 1e-5), **accuracies}
     height_mm = round(there[2] * 1000)
-    velocities = dict(zip(("velN", "velE", "velD"), (round(v * 1000) for v in velocity), strict=True))
-    course_acc = _unsigned(math.degrees(fixes.course_acc_rad[i]), 1e5)
     return {
         "fixType": _3D,
         "gnssFixOk": 1,
@@ -125,11 +123,11 @@ def _fix(fixes: Fixes, i: int, there: list[float], *, known: bool) -> dict[str, 
         "hMSL": height_mm,  # the sea is the ellipsoid
         "hAcc": _unsigned(fixes.horizontal_acc_m[i], 1000),
         "vAcc": _unsigned(fixes.vertical_acc_m[i], 1000),
-        **velocities,
+        **{f"vel{axis}": round(v * 1000) for axis, v in zip("NED", velocity, strict=True)},
         "gSpeed": round(speed * 1000),
         "headMot": _scaled(round(math.degrees(course) * 1e5) % 36_000_000, 1e-5),  # 359.999996 is 0
         "sAcc": _unsigned(fixes.speed_acc_m_s[i], 1000),
-        "headAcc": _scaled(course_acc, 1e-5),
+        "headAcc": _scaled(_unsigned(math.degrees(fixes.course_acc_rad[i]), 1e5), 1e-5),
         "pDOP": 99.995,  # unknown: no satellites are simulated
     }
 
@@ -182,6 +180,7 @@ def _take(where: str, m: Any, epochs: dict[int, Epoch], problems: list[Problem])
     if not m.gnssFixOk or m.invalidLlh or m.fixType not in (_2D, _3D, _WITH_DEAD_RECKONING):
         epochs[ns] = Epoch(where, void=True)
         return
+    horizontal_m, vertical_m, speed_m_s = (_known(units, 1000) for units in (m.hAcc, m.vAcc, m.sAcc))
     epochs[ns] = Epoch(
         where,
         latitude_deg=m.lat,
@@ -190,11 +189,9 @@ def _take(where: str, m: Any, epochs: dict[int, Epoch], problems: list[Problem])
         v_e_m_s=(m.velN / 1000, m.velE / 1000, m.velD / 1000),
         course_deg=m.headMot % 360.0,
         speed_m_s=m.gSpeed / 1000,
-        accuracy=(
-            _known(m.hAcc, 1000), _known(m.vAcc, 1000), _known(m.sAcc, 1000), _known(round(m.headAcc * 1e5), 10**5),
-        ),
+        accuracy=(horizontal_m, vertical_m, speed_m_s, _known(round(m.headAcc * 1e5), 10**5)),
         satellites=m.numSV,
-    )  # fmt: skip
+    )
 
 
 def _known(units: int, per_unit: int) -> float:

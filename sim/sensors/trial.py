@@ -41,25 +41,25 @@ REACHED: Final = 1.0 - math.exp(-1.0)  # 63 %: reached by a first-order lag afte
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Simulation of a gyro or an accelerometer at rest, and the names of its noise parameters.
+    """Simulation of a gyro or an accelerometer at rest.
 
     unit : of the report      scale : from SI to that unit
+    figures : names of its parameters for noise density, bias instability and random walk
     """
 
     module: Any
     unit: str
     scale: float
-    density: str
-    instability: str
-    walk: str
+    figures: tuple[str, str, str]
 
 
 INERTIAL: Final = {
     "gyro": Inertial(
-        gyro, "deg/s", math.degrees(1.0), "noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s",
+        gyro, "deg/s", math.degrees(1.0),
+        ("noise_density_deg_s_sqrt_hz", "bias_instability_deg_s", "walk_deg_s_sqrt_s"),
     ),
     "accelerometer": Inertial(
-        accelerometer, "ug", 1e6 / G_M_S2, "noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s",
+        accelerometer, "ug", 1e6 / G_M_S2, ("noise_density_ug_sqrt_hz", "bias_instability_ug", "walk_ug_sqrt_s"),
     ),
 }  # fmt: skip
 
@@ -76,9 +76,6 @@ class Coefficient:
     def difference(self) -> float | None:
         """Relative difference of the simulated value from the data sheet."""
         return self.measured / self.datasheet - 1.0 if self.datasheet else None
-
-    def to_json(self) -> dict[str, Any]:
-        return {"measured": self.measured, "datasheet": self.datasheet, "unit": self.unit}
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,8 +166,8 @@ def at_rest(
 
 def figures(kind: str, params: Any) -> tuple[float, float, float]:
     """Noise density, bias instability and random walk of a gyro or an accelerometer, in the unit of the report."""
-    how = INERTIAL[kind]
-    return getattr(params, how.density), getattr(params, how.instability), getattr(params, how.walk)
+    density, instability, walk = (getattr(params, name) for name in INERTIAL[kind].figures)
+    return density, instability, walk
 
 
 def step(kind: str, params: Any) -> float:
@@ -266,14 +263,16 @@ def fitted(devices: Mapping[str, Any]) -> SuiteParams:
     return SuiteParams(**(always | dict(devices)))
 
 
-def check_rates(devices: Mapping[str, Any]) -> None:
-    """Reject a sensor rate that does not divide the clock of the trials: ValueError."""
-    rates = Rates(imu_hz=IMU_HZ)
-    for kind, params in devices.items():
-        if kind == "gps":
-            Rates(imu_hz=IMU_HZ, gps_hz=params.rate_hz)
-        elif kind not in INERTIAL:
-            rates.steps_per_sample(kind, params.rate_hz)
+def check_rates(devices: Mapping[str, Any], name: str) -> None:
+    """Reject a sensor rate that does not divide the clock of the trials: ValueError, with the `name` of the part."""
+    try:
+        for kind, params in devices.items():
+            if kind == "gps":
+                Rates(imu_hz=IMU_HZ, gps_hz=params.rate_hz)
+            elif kind not in INERTIAL:
+                Rates(imu_hz=IMU_HZ).steps_per_sample(kind, params.rate_hz)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def fly(params: SuiteParams, motion: Motion, seconds: float, rates: Rates, quiet: bool = False) -> Log:
@@ -408,21 +407,15 @@ class Surge:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class AirTrial:
-    """A minute of oscillating airspeed and height as measured by air-data sensors."""
-
-    log: Log
-
-    def errors(self, kind: str) -> Array:
-        """Reading minus truth of each sample, m/s or m."""
-        new = self.log.measured["air_new"] == 1
-        truth, measured = self.log.truth[new], self.log.measured[new]
-        if kind == "airspeed":
-            return np.asarray(measured["airspeed_m_s"] - truth["airspeed_m_s"])
-        return np.asarray(measured["baro_height_m"] + truth["p_e_m"][:, 2])
+def swing(devices: Mapping[str, Any]) -> Log:
+    """A minute of oscillating airspeed and height as measured by an airspeed sensor and a barometer."""
+    return fly(fitted(devices), Surge(), 60.0, Rates(imu_hz=IMU_HZ))
 
 
-def swing(devices: Mapping[str, Any]) -> AirTrial:
-    """Fly an airspeed sensor and a barometer."""
-    return AirTrial(fly(fitted(devices), Surge(), 60.0, Rates(imu_hz=IMU_HZ)))
+def air_errors(log: Log, kind: str) -> Array:
+    """Reading minus truth of each sample of `swing`, m/s or m."""
+    new = log.measured["air_new"] == 1
+    truth, measured = log.truth[new], log.measured[new]
+    if kind == "airspeed":
+        return np.asarray(measured["airspeed_m_s"] - truth["airspeed_m_s"])
+    return np.asarray(measured["baro_height_m"] + truth["p_e_m"][:, 2])

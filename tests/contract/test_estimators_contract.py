@@ -281,8 +281,8 @@ def test_bench_times_every_estimator(name):
     """Two seconds of cruise with each: figures for `update`, and for the kernel where there is one."""
     class_of(name)
     speed = bench.measure(name, 2.0, 1, lambda _done, _total: None)
-    assert speed.update_ns > 0.0
-    assert (speed.kernel_ns is None) == (name in NO_REPLAY)
+    assert speed.estimator_update_ns > 0.0
+    assert (speed.estimator_ns_per_call is None) == (name in NO_REPLAY)
 
 
 def test_register_own_class_enters_it_and_refuses_a_taken_name():

@@ -41,7 +41,7 @@ def variances():
     found = {(kind, name): np.zeros(len(TAU_S)) for kind, parts in PARTS.items() for name in parts}
     for kind, parts in PARTS.items():
         how, silent = INERTIAL[kind], PERFECT[kind]
-        ones = [replace(silent, **{name: 1.0}) for name in (how.density, how.instability, how.walk)]
+        ones = [replace(silent, **{name: 1.0}) for name in how.figures]
         for flight in range(FLIGHTS):
             alone = [drawn(kind, params, flight) for params in ones]
             for name, params in parts.items():

@@ -16,7 +16,7 @@ from scenarios.harness.cli.reports import attempt, check_picture, reporting, usa
 from sim.aeroplane import performance
 from sim.aeroplane.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.aeroplane.jsbsim_model import Model
-from sim.aeroplane.linear import LinearModel, Mode, linearise, modes
+from sim.aeroplane.linear import Mode, linearise, modes
 from sim.aeroplane.performance import Performance, radius_m
 from sim.aeroplane.trim import Trim
 
@@ -44,7 +44,6 @@ class Handbook:
     model: Model
     frame: Airframe
     performance: Performance
-    linear: LinearModel
     modes: tuple[Mode, ...]
     textbook: dict[str, Mode]
     lanchester: Mode
@@ -62,6 +61,7 @@ class Handbook:
     def to_json(self) -> dict[str, Any]:
         """The page as numbers named with their units; None for what does not exist."""
         p, frame = self.performance, self.frame
+        theory = {name: mode_json(m) for name, m in self.textbook.items()}
         return {
             "aircraft": self.name,
             "height_m": p.height_m,
@@ -85,16 +85,13 @@ class Handbook:
             "roll_surface": p.roll.surface,
             "roll_rate_deg_s": math.degrees(p.roll.rate_rad_s),
             "time_to_45_deg_bank_s": _finite(p.roll.to_45_deg_s),
-            "modes": {m.name: mode_json(m) | {"textbook": self._textbook_json(m.name)} for m in self.modes},
+            "modes": {m.name: mode_json(m) | {"textbook": theory.get(m.name)} for m in self.modes},
             "phugoid_lanchester": mode_json(self.lanchester),
             "derivatives": self.coefficients,
             "turns": [_turn_json(t) for t in p.turns],
             "turns_end": p.turns_end,
             "polar": [_glide_json(t) for t in p.polar],
         }
-
-    def _textbook_json(self, name: str) -> dict[str, Any] | None:
-        return mode_json(self.textbook[name]) if name in self.textbook else None
 
 
 def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
@@ -105,7 +102,7 @@ def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
     frame = Airframe.of(model, linear)
     simple = lanchester(p.cruise.airspeed_m_s, frame.lift_n / frame.drag_n)
     derivatives = coefficients(linear, frame)
-    return Handbook(name, model, frame, p, linear, modes(linear), textbook(linear), simple, derivatives)
+    return Handbook(name, model, frame, p, modes(linear), textbook(linear), simple, derivatives)
 
 
 def glide_ratio(t: Trim) -> float:
@@ -113,14 +110,9 @@ def glide_ratio(t: Trim) -> float:
 
 
 def mode_json(m: Mode) -> dict[str, Any]:
-    return {
-        "omega_rad_s": _finite(m.omega_rad_s),
-        "damping": _finite(m.damping),
-        "period_s": _finite(m.period_s),
-        "time_to_half_s": _finite(m.time_to_half_s),
-        "time_to_double_s": _finite(m.time_to_double_s),
-        "eigenvalues_per_s": [[e.real, e.imag] for e in m.eigenvalues],
-    }
+    names = ("omega_rad_s", "damping", "period_s", "time_to_half_s", "time_to_double_s")
+    figures = {name: _finite(getattr(m, name)) for name in names}
+    return figures | {"eigenvalues_per_s": [[e.real, e.imag] for e in m.eigenvalues]}
 
 
 def _finite(value: float) -> float | None:
@@ -157,8 +149,12 @@ def print_report(book: Handbook) -> None:
     frame = f"  {f.mass_kg:.3f} kg, {f.area_m2:.3f} m2, span {f.span_m:.2f} m, {loading}"
     out.print(console.titled(book.name, frame))
     out.print(f"Still air, {book.performance.height_m:g} m; modes at the cruise.", style="dim")
-    for grid in (_figures(book), _polar(book), _turns(book), _modes(book), _derivatives(book)):
-        out.print(grid)
+    out.print(console.table("Performance", ("", "", ""), figures(book), text=(0, 2)))
+    out.print(_polar(book))
+    out.print(_turns(book))
+    cruise = f"{book.performance.cruise.airspeed_m_s:g} m/s"
+    out.print(console.table(f"Modes at {cruise}", MODE_HEADINGS, mode_rows(book)))
+    out.print(_derivatives(book))
     simple = f"{_number(book.lanchester.omega_rad_s)} rad/s, damping {_number(book.lanchester.damping)}"
     out.print(f"A phugoid at a constant angle of attack (Lanchester) would have {simple}.", style="dim")
     if book.performance.turns_end:
@@ -201,42 +197,25 @@ def _deg(angle_rad: float) -> str:
     return f"{math.degrees(angle_rad):.1f} deg"
 
 
-def _figures(book: Handbook) -> Any:
-    return console.table("Performance", ("", "", ""), figures(book), text=(0, 2))
-
-
 def _polar(book: Handbook) -> Any:
     """Every few glides of the polar, at round angles of attack."""
     p = book.performance
-    rows = [
-        [
-            f"{t.airspeed_m_s:.1f}",
-            f"{-t.climb_m_s:.2f}",
-            f"{glide_ratio(t):.1f}",
-            f"{math.degrees(t.alpha_rad):.1f}",
-            f"{t.elevator:+.2f}",
-        ]
-        for t in p.polar[:: -max(1, len(p.polar) // 10)]
-    ]
+    row = "{airspeed_m_s:.1f} {sink_m_s:.2f} {glide_ratio:.1f} {alpha_deg:.1f} {elevator:+.2f}"
+    rows = [row.format(**_glide_json(t)).split() for t in p.polar[:: -max(1, len(p.polar) // 10)]]
     motor = ", motor off" if p.top_speed else ""
     return console.table(f"Glide polar{motor}", ("m/s", "sink m/s", "ratio", "alpha deg", "elevator"), rows, text=())
 
 
 def _turns(book: Handbook) -> Any:
     powered = book.performance.top_speed is not None
+    row = "{bank_deg:.0f} deg|{airspeed_m_s:.1f}|{radius_m:.1f}|{circle_s:.1f}|{load:.2f}|{last:.2f}"
     rows = [
-        [
-            f"{math.degrees(t.roll_rad):.0f} deg",
-            f"{t.airspeed_m_s:.1f}",
-            f"{radius_m(t):.1f}",
-            f"{2.0 * math.pi / t.turn_rate_rad_s:.1f}",
-            f"{1.0 / math.cos(t.roll_rad):.2f}",
-            f"{t.throttle:.2f}" if powered else f"{-t.climb_m_s:.2f}",
-        ]
+        row.format(**_turn_json(t), load=1.0 / math.cos(t.roll_rad), last=t.throttle if powered else -t.climb_m_s)
         for t in book.performance.turns
     ]
     title, last = ("Level turns", "throttle") if powered else ("Gliding turns", "sink m/s")
-    return console.table(title, ("bank", "m/s", "radius m", "circle s", "load g", last), rows)
+    headings = ("bank", "m/s", "radius m", "circle s", "load g", last)
+    return console.table(title, headings, [row.split("|") for row in rows])
 
 
 def mode_rows(book: Handbook) -> list[list[str]]:
@@ -256,10 +235,6 @@ MODE_HEADINGS = ("", "rad/s", "damping", "period s", "half s", "formula", "dampi
 
 def _number(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "none"
-
-
-def _modes(book: Handbook) -> Any:
-    return console.table(f"Modes at {book.performance.cruise.airspeed_m_s:g} m/s", MODE_HEADINGS, mode_rows(book))
 
 
 def _derivatives(book: Handbook) -> Any:

@@ -10,10 +10,10 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.interface import G_M_S2
+from scenarios.harness import picture_style as style
 from scenarios.harness.cli.reports import write_figure
 from scenarios.harness.commands.aircraft import MODE_HEADINGS, TITLES, Handbook, figures, glide_ratio, mode_rows
 from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
@@ -36,10 +36,9 @@ def draw(book: Handbook, path: Path) -> None:
     """Draw the page into `path`; its ending says the format."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(14.0, 11.4), facecolor="white")
-        FigureCanvasAgg(figure)
         margins = {"left": 0.05, "right": 0.94, "top": 0.875, "bottom": 0.03}
         grid = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 0.66), hspace=0.32, wspace=0.24, **margins)
-        _heading(figure, book)
+        style.heading(figure, 0.05, 0.94, book.name.replace("_", " "), _facts(book), "wingslevel aircraft")
         _polar(figure.add_subplot(grid[0, 0]), book)
         _power(figure.add_subplot(grid[0, 1]), book)
         _trims(figure.add_subplot(grid[0, 2]), book)
@@ -47,21 +46,18 @@ def draw(book: Handbook, path: Path) -> None:
         _poles(figure.add_subplot(grid[1, 0]), book, locus, near=False)
         _poles(figure.add_subplot(grid[1, 1]), book, locus, near=True)
         _turns(figure.add_subplot(grid[1, 2]), book)
-        _figure_table(figure.add_subplot(grid[2, 0]), book)
+        _table(figure.add_subplot(grid[2, 0]), figures(book), (0.0, 0.43, -0.46))
         _mode_table(figure.add_subplot(grid[2, 1:]), book)
         write_figure(path, figure, DPI)
 
 
-def _heading(figure: Any, book: Handbook) -> None:
+def _facts(book: Handbook) -> str:
     frame = book.frame
-    figure.text(0.05, 0.948, book.name.replace("_", " "), fontsize=25, fontweight="bold", color=INK)
-    facts = (
+    return (
         f"{frame.mass_kg:.2f} kg     span {frame.span_m:.2f} m     wing {frame.area_m2:.3f} m²     "
         f"{10.0 * frame.mass_kg / frame.area_m2:.1f} g/dm²     aspect ratio {frame.span_m**2 / frame.area_m2:.1f}     "
         f"still air, {book.performance.height_m:g} m"
     )
-    figure.text(0.05, 0.918, facts, fontsize=10.5, color=FAINT)
-    figure.text(0.94, 0.955, "wingslevel handbook", fontsize=10.5, color=FAINT, ha="right")
 
 
 def _speeds(trims: Sequence[Trim]) -> np.ndarray:
@@ -72,28 +68,31 @@ def _mark(ax: Any, x: float, y: float, text: str, colour: str, offset: tuple[flo
     """A dot with a word beside it; a thin line leads to one far off."""
     ax.plot(x, y, "o", color=colour, ms=6.5, mec="white", mew=1.2, zorder=5)
     lead = {"arrowstyle": "-", "color": colour, "lw": 0.7, "shrinkB": 4} if math.hypot(*offset) > 25.0 else None
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
     side = {"ha": "left" if offset[0] > 0 else "right" if offset[0] < 0 else "center", "va": "center"}
     ax.annotate(
         text, (x, y), offset, textcoords="offset points", fontsize=8.3, color=colour, zorder=6, arrowprops=lead,
-        bbox=box, **side,
+        bbox=style.BOX, **side,
     )  # fmt: skip
+
+
+def _speed_line(ax: Any, speed_m_s: float, y: float, text: str, colour: str, side: str) -> None:
+    """A dashed line at a speed, with its name beside it."""
+    ax.axvline(speed_m_s, color=colour, lw=1.0, ls=style.DASHED)
+    ax.text(speed_m_s, y, text, fontsize=8.3, color=colour, ha=side, transform=ax.get_xaxis_transform())
 
 
 def _polar(ax: Any, book: Handbook) -> None:
     """Sink against speed, with the tangent from the origin that touches at the best glide."""
     p = book.performance
-    sinks = np.array([-t.climb_m_s for t in p.polar])
-    ax.plot(_speeds(p.polar), sinks, color=BLUE)
-    forward = p.best_glide.airspeed_m_s
-    reach = np.array([0.0, 1.6 * forward])
-    ax.plot(reach, reach * math.sin(-p.best_glide.climb_rad), color=GREEN, lw=1.0, ls=(0, (5, 3)))
-    sink = -p.best_glide.climb_m_s
-    _mark(ax, forward, sink, f"best glide {glide_ratio(p.best_glide):.1f} : 1\nat {forward:.1f} m/s", GREEN, (16, 18))
-    sink, slow = -p.min_sink.climb_m_s, p.min_sink.airspeed_m_s
-    _mark(ax, slow, sink, f"least sink {sink:.2f} m/s\nat {slow:.1f} m/s", ORANGE, (-34, -34))
-    sink = -p.stall.climb_m_s
-    _mark(ax, p.stall.airspeed_m_s, sink, f"stall {p.stall.airspeed_m_s:.1f} m/s", RED, (-4, -66))
+    ax.plot(_speeds(p.polar), [-t.climb_m_s for t in p.polar], color=BLUE)
+    reach = np.array([0.0, 1.6 * p.best_glide.airspeed_m_s])
+    ax.plot(reach, reach * math.sin(-p.best_glide.climb_rad), color=GREEN, lw=1.0, ls=style.DASHED)
+    for t, what, colour, offset in (
+        (p.best_glide, f"best glide {glide_ratio(p.best_glide):.1f} : 1\nat", GREEN, (16, 18)),
+        (p.min_sink, f"least sink {-p.min_sink.climb_m_s:.2f} m/s\nat", ORANGE, (-34, -34)),
+        (p.stall, "stall", RED, (-4, -66)),
+    ):
+        _mark(ax, t.airspeed_m_s, -t.climb_m_s, f"{what} {t.airspeed_m_s:.1f} m/s", colour, offset)
     ax.set(xlim=(0.0, 2.2 * p.stall.airspeed_m_s), ylim=(3.4 * -p.min_sink.climb_m_s, 0.0))
     ax.set(xlabel="airspeed, m/s", ylabel="sink, m/s", title="Glide polar" + (", motor off" if p.top_speed else ""))
 
@@ -122,9 +121,7 @@ def _power(ax: Any, book: Handbook) -> None:
     text = f"best climb\n{best.climb_m_s:.1f} m/s\nat {best.airspeed_m_s:.1f} m/s"
     ax.text(best.airspeed_m_s * 1.02, 0.5 * (low + high), text, fontsize=8.3, va="center")
     top = p.top_speed.airspeed_m_s
-    ax.axvline(top, color=RED, lw=1.0, ls=(0, (5, 3)))
-    where = {"fontsize": 8.3, "color": RED, "ha": "right", "transform": ax.get_xaxis_transform()}
-    ax.text(top, 0.02, f"top speed {top:.1f} m/s ", **where)
+    _speed_line(ax, top, 0.02, f"top speed {top:.1f} m/s ", RED, "right")
     ax.set(xlabel="airspeed, m/s", ylabel="power, W", title="Power and climb")
 
 
@@ -158,9 +155,7 @@ def _trims(ax: Any, book: Handbook) -> None:
         handles.append(("throttle", GREEN))
     lines = [matplotlib.lines.Line2D([], [], color=colour, label=label) for label, colour in handles]
     ax.legend(handles=lines, loc="lower left")
-    ax.axvline(p.cruise.airspeed_m_s, color=FAINT, lw=1.0, ls=(0, (5, 3)))
-    where = {"fontsize": 8.3, "color": FAINT, "transform": ax.get_xaxis_transform()}
-    ax.text(p.cruise.airspeed_m_s, 0.96, " cruise", **where)
+    _speed_line(ax, p.cruise.airspeed_m_s, 0.96, " cruise", FAINT, "left")
     ax.set_title("Trim, level" if p.top_speed else "Trim, gliding")
 
 
@@ -182,26 +177,12 @@ def _poles(ax: Any, book: Handbook, locus: list[tuple[float, tuple[Mode, ...]]],
     for speed, several in locus:
         size = 1.5 + 3.5 * (speed - locus[0][0]) / (locus[-1][0] - locus[0][0])
         for mode in several:
-            for e in mode.eigenvalues:
-                if e.imag >= 0.0:
-                    ax.plot(e.real, e.imag, "o", color=COLOURS[mode.name], ms=size, alpha=0.45, mew=0)
+            _roots(ax, mode, color=COLOURS[mode.name], ms=size, alpha=0.45, mew=0)
     for mode in book.modes:
-        colour, formula = COLOURS[mode.name], book.textbook.get(mode.name)
-        upper = [e for e in mode.eigenvalues if e.imag >= 0.0]
-        label = TITLES[mode.name]
-        ax.plot(
-            [e.real for e in upper],
-            [e.imag for e in upper],
-            "o",
-            color=colour,
-            ms=8,
-            mec="white",
-            label=label,
-            zorder=5,
-        )
-        if formula:
-            upper = [e for e in formula.eigenvalues if e.imag >= 0.0]
-            ax.plot([e.real for e in upper], [e.imag for e in upper], "o", mfc="none", mec=colour, ms=12, zorder=4)
+        colour = COLOURS[mode.name]
+        _roots(ax, mode, color=colour, ms=8, mec="white", label=TITLES[mode.name], zorder=5)
+        if mode.name in book.textbook:
+            _roots(ax, book.textbook[mode.name], mfc="none", mec=colour, ms=12, zorder=4)
     roots = [e for _, several in locus for mode in several for e in mode.eigenvalues]
     roots = [e for e in roots if abs(e) < inside] if near else roots
     left, right = min(e.real for e in roots), max(max(e.real for e in roots), 0.0)
@@ -215,9 +196,15 @@ def _poles(ax: Any, book: Handbook, locus: list[tuple[float, tuple[Mode, ...]]],
     if not near:
         ax.legend(loc="upper left", ncols=2, handletextpad=0.2, columnspacing=0.8)
         cruise = book.performance.cruise.airspeed_m_s
-        note = f"disc: cruise, {cruise:g} m/s     ring: formula     dots: {locus[0][0]:.1f} to {locus[-1][0]:.1f} m/s"
-        ax.text(0.0, 1.012, note, transform=ax.transAxes, fontsize=7.8, color=FAINT)
+        dots = f"dots: {locus[0][0]:.1f} to {locus[-1][0]:.1f} m/s"
+        style.note(ax, f"disc: cruise, {cruise:g} m/s     ring: formula     {dots}")
         ax.set_title(title, pad=15)
+
+
+def _roots(ax: Any, mode: Mode, **look: Any) -> None:
+    """A disc for each root in the upper half of the plane."""
+    upper = [e for e in mode.eigenvalues if e.imag >= 0.0]
+    ax.plot([e.real for e in upper], [e.imag for e in upper], "o", **look)
 
 
 def _near(book: Handbook) -> float:
@@ -266,20 +253,16 @@ def _turns(ax: Any, book: Handbook) -> None:
     ax.set(xlabel="airspeed, m/s", ylabel="rate of turn, deg/s", title="Steady turns, by bank angle")
 
 
-def _table(ax: Any, rows: Sequence[Sequence[str]], edges: Sequence[float], heading: int | None = None) -> None:
+def _table(ax: Any, rows: Sequence[Sequence[str]], edges: Sequence[float], headed: bool = False) -> None:
     """Text in columns that end at `edges`; the first, and those of a negative edge, begin there."""
     ax.axis("off")
     ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     for i, row in enumerate(rows):
         y = 0.93 - i * 0.102
         for j, (text, edge) in enumerate(zip(row, edges, strict=True)):
-            colour = FAINT if heading == i else INK
+            colour = FAINT if headed and i == 0 else INK
             ax.text(abs(edge), y, text, ha="left" if edge <= 0.0 or j == 0 else "right", va="center", color=colour)
         ax.plot([0.0, 1.0], [y - 0.051] * 2, color=GRID, lw=0.8, clip_on=False)
-
-
-def _figure_table(ax: Any, book: Handbook) -> None:
-    _table(ax, figures(book), (0.0, 0.43, -0.46))
 
 
 def _mode_table(ax: Any, book: Handbook) -> None:
@@ -288,6 +271,6 @@ def _mode_table(ax: Any, book: Handbook) -> None:
     last = ["phugoid after Lanchester", "", "", "", "", f"{simple.omega_rad_s:.3g}", f"{simple.damping:.3g}"]
     c = book.coefficients
     groups = (("CL_alpha", "Cm_alpha", "Cm_q"), ("Cl_beta", "Cl_p", "Cl_r"), ("Cn_beta", "Cn_p", "Cn_r"))
-    _table(ax, [heads, *mode_rows(book), last], (0.0, 0.36, 0.48, 0.60, 0.72, 0.86, 0.985), heading=0)
+    _table(ax, [heads, *mode_rows(book), last], (0.0, 0.36, 0.48, 0.60, 0.72, 0.86, 0.985), headed=True)
     text = "     ".join("   ".join(f"{name} {c[name]:+.3f}" for name in group) for group in groups)
     ax.text(0.0, 0.93 - 0.102 * (len(book.modes) + 2) - 0.02, text, fontsize=8.3, color=FAINT, va="center")

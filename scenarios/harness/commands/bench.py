@@ -1,15 +1,15 @@
 """Speed: the closed loop against bare JSBSim, stage by stage, and the estimator alone.
 
-The closed loop is `sim.loop.fly` itself in still air, timed from simulated second to simulated second, so that what
-happens once (trim, drawing the noise) is left out and what happens every tick is not.  Bare is the same plant object,
-in the same state, running the same physics with its commands left as they are.  The two alternate in one process;
-the ratio of the two minima is the figure, the median over the pairs shows how quiet the machine was.
+The closed loop is `sim.loop.fly` in still air, timed from the first simulated second to the last, which leaves out the
+start (trim, drawing the noise).  Bare JSBSim is the same plant in the same state with constant commands.  The two
+alternate in one process.  The result is the ratio of their minima; the median over the pairs shows how much other
+programs disturbed the measurement.
 """
 
 import platform
 import statistics
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from time import perf_counter_ns
 from typing import Any
 
@@ -18,13 +18,13 @@ from rich.text import Text
 from autopilot.interface import NEUTRAL, Autopilot, Mode, Setpoint
 from autopilot.pilot import Script, Timed
 from estimator.instruments import Instruments
-from estimator.interface import AttitudeEstimator, Measurements
+from estimator.interface import AttitudeEstimator
 from scenarios.harness.checks import Row
 from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
 from scenarios.harness.equipping import equipped, equipped_autopilot, heading_reference_of
 from scenarios.harness.gate import guard
-from scenarios.harness.timing import least_ns
+from scenarios.harness.timing import Cost, NotTimed, cost_of, least_ns
 from scenarios.harness.verdict import FAILED, SIMULATION_FAILED
 from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.clock import Rates
@@ -46,36 +46,40 @@ _NS_PER_US = 1e3
 class Speed:
     """The measurements.
 
-    bare_us, closed_us : per tick, least of the repeats           median_ratio : over the pairs
-    stages_us : per tick, by stage, recording included            update_ns : the estimator's `update`, per call
-    kernel_ns : its kernel over a whole log in one call, per tick; None if it has none (no `replay`)
+    closed_loop_ratio_median : over the pairs of flights
+    bare_us_per_tick, closed_loop_us_per_tick : least of the repeats      stages_us_per_tick : recording included
+    estimator_ns_per_call : its kernel over a whole log in one call, per tick; None if it has none (no `replay`)
+    estimator_update_ns : a call of its `update`      ticks : of one flight      repeats : pairs of flights
     """
 
+    closed_loop_ratio_median: float
+    bare_us_per_tick: float
+    closed_loop_us_per_tick: float
+    stages_us_per_tick: dict[str, float]
     estimator: str
-    n_ticks: int
+    estimator_ns_per_call: float | None
+    estimator_update_ns: float
+    ticks: int
     repeats: int
-    bare_us: float
-    closed_us: float
-    median_ratio: float
-    stages_us: dict[str, float]
-    update_ns: float
-    kernel_ns: float | None
 
     @property
     def ratio(self) -> float:
         """Closed loop over bare."""
-        return self.closed_us / self.bare_us
+        return self.closed_loop_us_per_tick / self.bare_us_per_tick
 
     @property
     def rows(self) -> list[Row]:
         """The requirements, with their limits."""
-        rows = [
-            _limited("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
-            _limited(f"{self.estimator}: update()", "ns", self.update_ns, UPDATE_LIMIT_NS),
+        requirements = (
+            ("closed loop over bare JSBSim", "", self.ratio, RATIO_LIMIT),
+            (f"{self.estimator}: update()", "ns", self.estimator_update_ns, UPDATE_LIMIT_NS),
+            (f"{self.estimator}: kernel", "ns", self.estimator_ns_per_call, KERNEL_LIMIT_NS),
+        )
+        return [
+            Row(name, unit, value, "<=", limit, value <= limit)
+            for name, unit, value, limit in requirements
+            if value is not None
         ]
-        if self.kernel_ns is not None:
-            rows.append(_limited(f"{self.estimator}: kernel", "ns", self.kernel_ns, KERNEL_LIMIT_NS))
-        return rows
 
     @property
     def passed(self) -> bool:
@@ -84,33 +88,8 @@ class Speed:
 
     def to_json(self) -> dict[str, Any]:
         """The values by name; names include the unit."""
-        return {
-            "passed": self.passed,
-            "closed_loop_ratio": self.ratio,
-            "closed_loop_ratio_median": self.median_ratio,
-            "bare_us_per_tick": self.bare_us,
-            "closed_loop_us_per_tick": self.closed_us,
-            "stages_us_per_tick": self.stages_us,
-            "estimator": self.estimator,
-            "estimator_ns_per_call": self.kernel_ns,
-            "estimator_update_ns": self.update_ns,
-            "ticks": self.n_ticks,
-            "repeats": self.repeats,
-            "python": platform.python_version(),
-            "machine": platform.machine(),
-        }
-
-
-def _limited(name: str, unit: str, value: float, limit: float) -> Row:
-    return Row(name, unit, value, "<=", limit, value <= limit)
-
-
-class NotTimed(RuntimeError):
-    """A flight that did not last, or flight code that failed while it was timed; `exit_code` as for a flight."""
-
-    def __init__(self, why: str, exit_code: int = FAILED) -> None:
-        super().__init__(why)
-        self.exit_code = exit_code
+        machine = {"python": platform.python_version(), "machine": platform.machine()}
+        return {"passed": self.passed, "closed_loop_ratio": self.ratio} | asdict(self) | machine
 
 
 _BENCHMARK = "the benchmark"
@@ -146,9 +125,8 @@ class Cruise:
         def watch(log: Log, n_rows: int) -> None:  # noqa: ARG001 - as the loop calls it
             marks.append((n_rows, perf_counter_ns()))
 
-        self.whole(
-            fly(self.plant, self.suite, *self.pilots(), Script([Timed(0.0, self.setpoint)]), self.log, watch=watch)
-        )
+        script = Script([Timed(0.0, self.setpoint)])
+        self.whole(fly(self.plant, self.suite, *self.pilots(), script, self.log, watch=watch))
         (first, begin_ns), (last, end_ns) = marks[0], marks[-1]
         return (end_ns - begin_ns) / (last - first) / _NS_PER_US
 
@@ -188,32 +166,14 @@ class Cruise:
             for i, spent in enumerate((t1 - t0, t2 - t1, t3 - t2, clock() - t3)):
                 total[i] += spent
         per_reading = least_ns(lambda: [clock() for _ in range(1000)]) / 1000
-        return {
-            stage: (spent / len(self.log) - per_reading) / _NS_PER_US
-            for stage, spent in zip(STAGES, total, strict=True)
-        }
+        per_tick = [(spent / len(self.log) - per_reading) / _NS_PER_US for spent in total]
+        return dict(zip(STAGES, per_tick, strict=True))
 
-    def update_ns(self) -> float:
-        """`update` over the measurements of the last flight, nanoseconds a call."""
+    def cost(self) -> Cost:
+        """Cost of an update of the estimator alone, over the measurements of the last flight."""
         estimator, _ = self.pilots()
-        rows = self.log.measured.copy()
-        inputs = [Measurements(rows, k) for k in range(len(rows))]
-
-        def run() -> None:
-            update = estimator.update
-            for m in inputs:
-                update(m)
-
         with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
-            return least_ns(run) / len(inputs)
-
-    def kernel_ns(self) -> float | None:
-        """The kernel over the same measurements in one call, nanoseconds a tick; None if there is none."""
-        estimator, _ = self.pilots()
-        rows = self.log.measured.copy()
-        with blaming(Outcome.ESTIMATOR_FAILED, estimator, 0.0):
-            replay = getattr(estimator, "replay", None)
-            return None if replay is None else least_ns(lambda: replay(rows)) / len(rows)
+            return cost_of(estimator, self.log.measured)
 
 
 def measure(estimator: str, seconds: float, repeats: int, advance: Callable[[int, int], None]) -> Speed:
@@ -242,17 +202,18 @@ def _measured(estimator: str, seconds: float, repeats: int, advance: Callable[[i
         closed.append(cruise.closed_us())
         bare.append(cruise.bare_us())
         advance(i + 1, repeats)
+    cost = cruise.cost()
     by_repeat = [cruise.stages_us() for _ in range(max(3, repeats // 4))]
     return Speed(
+        closed_loop_ratio_median=statistics.median(c / b for c, b in zip(closed, bare, strict=True)),
+        bare_us_per_tick=min(bare),
+        closed_loop_us_per_tick=min(closed),
+        stages_us_per_tick={stage: min(stages[stage] for stages in by_repeat) for stage in STAGES},
         estimator=estimator,
-        n_ticks=len(cruise.log),
+        estimator_ns_per_call=cost.replay_ns,
+        estimator_update_ns=cost.update_ns,
+        ticks=len(cruise.log),
         repeats=repeats,
-        bare_us=min(bare),
-        closed_us=min(closed),
-        median_ratio=statistics.median(c / b for c, b in zip(closed, bare, strict=True)),
-        stages_us={stage: min(stages[stage] for stages in by_repeat) for stage in STAGES},
-        update_ns=cruise.update_ns(),
-        kernel_ns=cruise.kernel_ns(),
     )
 
 
@@ -260,16 +221,11 @@ def print_report(speed: Speed) -> None:
     """The figures, and where the time goes."""
     out = console.out()
     out.print(console.verdict_table("speed in still air", speed.rows))
-    parts = {"bare JSBSim": speed.bare_us, "closed loop": speed.closed_us} | {
-        f"  {stage}": us for stage, us in speed.stages_us.items()
-    }
+    parts = {"bare JSBSim": speed.bare_us_per_tick, "closed loop": speed.closed_loop_us_per_tick}
+    parts |= {f"  {stage}": us for stage, us in speed.stages_us_per_tick.items()}
     out.print(console.figure_table("where the time goes", parts, "us per tick"))
-    out.print(
-        Text(
-            f"{speed.repeats} pairs of {speed.n_ticks} ticks; median ratio of the pairs {speed.median_ratio:.2f} "
-            f"(least over least {speed.ratio:.2f})"
-        )
-    )
+    ratios = f"median ratio of the pairs {speed.closed_loop_ratio_median:.2f} (least over least {speed.ratio:.2f})"
+    out.print(Text(f"{speed.repeats} pairs of {speed.ticks} ticks; {ratios}"))
 
 
 def run(estimator: str, seconds: float, repeats: int, json_: str | None) -> int:

@@ -156,25 +156,19 @@ def fly(plan: Plan, workers: int, advance: Callable[[int, int], None], *, limit_
     """
     # Seed by seed, so that an interruption leaves each estimator about as many flights as the others.
     tasks = [Task(plan.named, seed, name, plan.changes[name]) for seed in plan.seeds for name in plan.names]
-    done = fly_each(
-        tasks,
-        workers,
-        advance,
-        limit_s=limit_s,
-        interrupted=lambda flown: flown.verdict.outcome == Outcome.INTERRUPTED,
-    )
+
+    def interrupted(flown: Traced) -> bool:
+        return flown.verdict.outcome == Outcome.INTERRUPTED
+
+    done = fly_each(tasks, workers, advance, limit_s=limit_s, interrupted=interrupted)
     failed = {tasks[i].estimator for i in done if done[i].verdict.outcome in FLIGHT_CODE_FAILED}
     costs = _costs(plan, failed, min(workers, 1), limit_s) if len(done) == len(tasks) else {}
     entrants = []
     for name in plan.names:
         flights = tuple(done[i] for i in sorted(done) if tasks[i].estimator == name)
-        pooled = Verdict.of((plan.scenario, f.verdict) for f in flights).pooled
-        entrants.append(
-            Entrant(
-                name, plan.given[name], plan.references[name], len(plan.seeds), flights,
-                pooled[0] if pooled else None, costs.get(name),
-            )
-        )  # fmt: skip
+        pooled = next(iter(Verdict.of((plan.scenario, f.verdict) for f in flights).pooled), None)
+        about = name, plan.given[name], plan.references[name], len(plan.seeds)
+        entrants.append(Entrant(*about, flights, pooled, costs.get(name)))
     return Comparison(plan.scenario, plan.config, plan.seeds, tuple(entrants), plan.notes)
 
 

@@ -15,22 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from estimator.interface import Array
+from scenarios.harness import picture_style as style
 from scenarios.harness.cli.reports import write_figure
 from scenarios.harness.commands.comparison import LETTERS, Comparison, Entrant, checks_text
 from scenarios.harness.metrics import Series, p95, rms
-from scenarios.harness.picture_style import (
-    BLUE,
-    DPI,
-    FAINT,
-    GREEN,
-    GRID,
-    INK,
-    ORANGE,
-    RED,
-    STYLE,
-    TEAL,
-    VIOLET,
-)
+from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, TEAL, VIOLET
 from scenarios.harness.plugins import short_name
 from sim.outside.wording import plotted
 
@@ -66,33 +55,28 @@ def figure_of(comparison: Comparison, kind: type[Figure] = Figure) -> Figure:
         edges = {"left": 0.055, "right": 0.975, "top": 1.0 - 1.35 / height, "bottom": 0.62 / height}
         rows = figure.add_gridspec(2, 1, height_ratios=(4.3, table), hspace=2 * 1.1 / (4.3 + table), **edges)
         upper = rows[0].subgridspec(1, 2, width_ratios=(2.1, 1.0), wspace=0.14)
-        _heading(figure, comparison, height)
+        name = plotted(comparison.scenario.name.replace("_", " "))
+        style.heading(figure, 0.055, 0.975, name, _facts(comparison), "wingslevel compare")
         _over_time(figure.add_subplot(upper[0]), flown, colours)
         _spread(figure.add_subplot(upper[1]), flown, colours)
         lower = rows[1].subgridspec(1, 4, width_ratios=(1.85, 2.2, 2.2, 1.5), wspace=0.06)
-        names, inclination, heading, cost = (figure.add_subplot(lower[i]) for i in range(4))
-        _names(names, flown, colours)
-        _strips(inclination, flown, colours, "inclination")
-        _strips(heading, flown, colours, "heading")
-        _costs(cost, flown, colours)
+        _names(figure.add_subplot(lower[0]), flown, colours)
+        _strips(figure.add_subplot(lower[1]), flown, colours, "inclination")
+        _strips(figure.add_subplot(lower[2]), flown, colours, "heading")
+        _costs(figure.add_subplot(lower[3]), flown, colours)
     return figure
 
 
-def _heading(figure: Any, comparison: Comparison, height: float) -> None:
+def _facts(comparison: Comparison) -> str:
     config, n = comparison.config, len(comparison.seeds)
-    figure.text(
-        0.055, 1.0 - 0.55 / height, plotted(comparison.scenario.name.replace("_", " ")), fontsize=25, fontweight="bold"
-    )
-    wind = f"wind {config.air.wind_m_s:g} m/s, turbulence W20 {config.air.turbulence_w20_m_s:g} m/s"
     facts = (
         plotted(comparison.scenario.summary, 120),
         f"{n} {'seed' if n == 1 else 'seeds'}, the same for each",
         plotted(config.aircraft.replace("_", " ")),
         f"sensors {plotted(Path(config.suite).stem)}",
-        wind,
+        f"wind {config.air.wind_m_s:g} m/s, turbulence W20 {config.air.turbulence_w20_m_s:g} m/s",
     )
-    figure.text(0.055, 1.0 - 0.86 / height, "     ".join(facts), fontsize=10.5, color=FAINT)
-    figure.text(0.975, 1.0 - 0.48 / height, "wingslevel compare", fontsize=10.5, color=FAINT, ha="right")
+    return "     ".join(facts)
 
 
 def _log_degrees(axis: Any, low: float, high: float) -> None:
@@ -140,8 +124,7 @@ def _over_time(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) ->
     ax.set_title("Inclination error over time", pad=15)
     shaded = not many and any(len(e.flights) > 2 for e in entrants)
     shade = "shade: the middle half     " if shaded else ""
-    note = f"line: median of the seeds, RMS of every {bin_s:g} s     {shade}cross: a flight that ended early"
-    ax.text(0.0, 1.012, note, transform=ax.transAxes, fontsize=7.8, color=FAINT)
+    style.note(ax, f"line: median of the seeds, RMS of every {bin_s:g} s     {shade}cross: a flight that ended early")
     ax.margins(x=0.01)
     _log_degrees(ax.yaxis, floor, 1.6 * top)
 
@@ -162,7 +145,7 @@ def _spread(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> No
     ax.set(xscale="log", xlim=(0.8 * low, 1.15 * high), ylim=(0.0, 101.0))
     ax.set(xlabel="inclination error, deg", ylabel="time spent below it, %")
     ax.set_title("How it is spread", pad=15)
-    ax.text(0.0, 1.012, "all seeds together     disc: 95 %", transform=ax.transAxes, fontsize=7.8, color=FAINT)
+    style.note(ax, "all seeds together     disc: 95 %")
     _log_degrees(ax.xaxis, 0.8 * low, 1.15 * high)
 
 
@@ -222,8 +205,7 @@ def _strips(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str], which
     ax.set(xscale="log", xlim=(low, high * (high / low) ** (0.3 if which == "heading" else 0.22)))
     ax.set(xlabel="deg")
     ax.set_title(f"{which.capitalize()} error", pad=15)
-    note = "dot: RMS of a seed     diamond: of all     bar: 95 % of all samples"
-    ax.text(0.0, 1.0, note, transform=ax.transAxes, fontsize=7.8, color=FAINT, va="bottom")
+    style.note(ax, "dot: RMS of a seed     diamond: of all     bar: 95 % of all samples", 1.0, va="bottom")
     _log_degrees(ax.xaxis, low, high)
 
 

@@ -1,7 +1,7 @@
 """The result of a comparison: a line of numbers for each estimator, printed, as JSON and as Markdown."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ from estimator.instruments import Known, to_json
 from estimator.interface import Array, HeadingReference
 from scenarios.harness.cli import console
 from scenarios.harness.config import FlightConfig
-from scenarios.harness.metrics import Series, rms
+from scenarios.harness.metrics import Series, highest, p95, rms
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.timing import Cost
 from scenarios.harness.verdict import FlightVerdict, PooledVerdict, Verdict
@@ -80,12 +80,12 @@ class Entrant:
     def numbers(self) -> dict[str, float]:
         """Its errors: RMS as the root of the mean square over flights, the others over all samples of all flights."""
         inclination = [f.inclination.judged_values for f in self.flights]
-        heading = [f.heading.judged_values for f in self.flights]
+        joined = np.concatenate([np.empty(0), *inclination])
         return {
             "inclination_rms_deg": _pooled_rms(inclination),
-            "inclination_p95_deg": _over_all(inclination, lambda v: float(np.percentile(v, 95.0))),
-            "inclination_max_deg": _over_all(inclination, lambda v: float(np.max(v))),
-            "heading_rms_deg": _pooled_rms(heading),
+            "inclination_p95_deg": p95(joined),
+            "inclination_max_deg": highest(joined),
+            "heading_rms_deg": _pooled_rms([f.heading.judged_values for f in self.flights]),
         }
 
     def to_json(self) -> dict[str, Any]:
@@ -180,13 +180,7 @@ def checks_text(entrant: Entrant) -> str:
 
 
 def _pooled_rms(values: Sequence[Array]) -> float:
-    each = np.array([rms(v) for v in values if len(v)])
-    return rms(each)
-
-
-def _over_all(values: Sequence[Array], reduce: Callable[[Array], float]) -> float:
-    joined = np.concatenate(values) if values else np.empty(0)
-    return reduce(joined) if len(joined) else math.nan
+    return rms(np.array([rms(v) for v in values if len(v)]))
 
 
 _HEADINGS = (

@@ -2,7 +2,6 @@
 
 import gzip
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import partial
@@ -91,11 +90,11 @@ def make_of(
         fixes = Fixes.from_log(flight.log.measured, accuracy_of(flight))
     if len(fixes) == 0 and (nmea is not None or ubx is not None):
         raise ValueError(f"no GPS fix arrived in {source}: nothing to export")
-    encoders: dict[str, tuple[Path | None, Callable[..., bytes]]] = {
-        "NMEA": (nmea, gps_messages.encode_nmea),
-        "UBX": (ubx, gps_messages.encode_ubx),
-    }
-    files = {name: (path, encode(fixes, start=start)) for name, (path, encode) in encoders.items() if path is not None}
+    files: dict[str, tuple[Path, bytes]] = {}
+    if nmea is not None:
+        files["NMEA"] = nmea, gps_messages.encode_nmea(fixes, start=start)
+    if ubx is not None:
+        files["UBX"] = ubx, gps_messages.encode_ubx(fixes, start=start)
     if csv is not None:
         columns = export_text.columns(flight)
         text = export_text.to_csv(columns).encode()
@@ -147,11 +146,9 @@ def print_report(export: Export) -> None:
     """Print the table."""
     first_t_s, last_t_s = _span(export.fixes)
     times = ["none" if t is None else f"{export.utc(t):%H:%M:%S.%f}"[:-3] for t in (first_t_s, last_t_s)]
-    rows = []
-    for name, (path, data) in export.files.items():
-        of_fixes = name in ("NMEA", "UBX")
-        held = str(len(export.fixes)) if of_fixes else str(export.rows) if name == "CSV" else ""
-        rows.append((name, held, *(times if of_fixes else ("", "")), str(len(data)), str(path)))
+    fixes = str(len(export.fixes)), *times
+    held = {"NMEA": fixes, "UBX": fixes, "CSV": (str(export.rows), "", ""), "map": ("", "", "")}
+    rows = [(name, *held[name], str(len(data)), str(path)) for name, (path, data) in export.files.items()]
     headings = ("", "fixes, rows", "first, UTC", "last, UTC", "bytes", "file")
     title = f"GPS fixes of {export.utc(first_t_s or 0.0):%Y-%m-%d}" if "CSV" not in export.files else "exported"
     console.out().print(console.table(title, headings, rows, text=(0, 5)))

@@ -12,6 +12,7 @@ from scenarios.harness.cli.reports import attempt, check_picture, refusal, repor
 from scenarios.harness.commands import sensors
 from scenarios.harness.commands.sensors import Subject
 from sim.params import near_misses
+from sim.sensors import trial
 from sim.sensors.datasheet import KINDS, Part, load_part, part_names, read_text, read_toml
 from sim.sensors.fitting import NO_FILES, SUITES, load_suite, suite_names, suite_parts, suite_settings
 
@@ -113,7 +114,7 @@ def run(part: str | None, picture: Path | None, json_: str | None) -> None:
         with usage():
             check_picture(picture)
             about = subject(part)
-            sensors.check_rates(about, part)
+            trial.check_rates(about.devices, part)
         with console.progress("lying still", "axis-hours") as advance:
             page = sensors.make(about, advance)
         if picture is not None:

@@ -5,7 +5,8 @@ Printed and as JSON.  What it does is tried out in `sim.sensors.trial`.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
+from itertools import count
 from typing import Any, Final
 
 from scenarios.harness.cli import console
@@ -13,15 +14,7 @@ from sim.log import Log
 from sim.params import unit_of, words_of
 from sim.sensors import trial as sensor_trial
 from sim.sensors.board import BoardParams
-from sim.sensors.trial import (
-    IMU_HZ,
-    INERTIAL,
-    AirTrial,
-    AtRest,
-    Coefficient,
-    MagneticTrial,
-    Response,
-)
+from sim.sensors.trial import IMU_HZ, INERTIAL, AtRest, MagneticTrial, Response, air_errors
 
 DRIFT_S: Final = 60.0
 NAMES: Final = {
@@ -61,7 +54,7 @@ class Page:
     exercise: Log | None
     response: Response | None
     magnetic: MagneticTrial | None
-    air: AirTrial | None
+    air: Log | None
 
     def to_json(self) -> dict[str, Any]:
         """The page as numbers named with their units; None if the data sheet does not specify them."""
@@ -83,8 +76,9 @@ class Page:
         found: dict[str, Any] = {}
         if kind in self.at_rest:
             rest = self.at_rest[kind]
-            found = {name: c.to_json() for name, c in rest.coefficients.items()}
-            found |= {"axis_hours": rest.axis_hours, "allan": _curve(rest)}
+            found = {name: asdict(c) for name, c in rest.coefficients.items()}
+            deviation = {f"deviation_{rest.unit.replace('/', '_')}": rest.deviation.tolist()}
+            found |= {"axis_hours": rest.axis_hours, "allan": {"tau_s": rest.tau_s.tolist()} | deviation}
         effects = {f"{what} ({unit})" if unit else what: _plain(value) for what, value, unit in self.effects(kind)}
         return found | {"effects": effects}
 
@@ -92,9 +86,8 @@ class Page:
         """What the sensor does to a signal: what, how much, unit."""
         params = self.subject.devices[kind]
         if kind in self.at_rest:
-            return _inertial_effects(kind, params, self.at_rest[kind]) + _supply_effects(
-                kind, params, self.subject.board
-            )
+            supply = _supply_effects(kind, params, self.subject.board)
+            return _inertial_effects(kind, params, self.at_rest[kind]) + supply
         if kind == "gps" and self.response is not None:
             return _gps_effects(params, self.response)
         if kind == "magnetometer" and self.magnetic is not None:
@@ -102,10 +95,6 @@ class Page:
         if kind in ("airspeed", "barometer") and self.air is not None:
             return _air_effects(kind, params, self.air)
         return []
-
-
-def _curve(rest: AtRest) -> dict[str, Any]:
-    return {"tau_s": rest.tau_s.tolist(), f"deviation_{rest.unit.replace('/', '_')}": rest.deviation.tolist()}
 
 
 def _plain(value: Any) -> Any:
@@ -125,14 +114,12 @@ def make(
     devices = subject.devices
     inertial = [kind for kind in INERTIAL if kind in devices]
     air = {kind: devices[kind] for kind in ("airspeed", "barometer") if kind in devices}
-    done = 0
+    hours, done = 3.0 * seconds / 3600.0, count(1)  # of a record's three axes
 
-    def told() -> None:
-        nonlocal done
-        done += 1
-        advance(3 * done * seconds / 3600.0, 3 * len(inertial) * flights * seconds / 3600.0)
+    def step() -> None:
+        advance(next(done) * hours, len(inertial) * flights * hours)
 
-    rest = {kind: sensor_trial.at_rest(kind, devices[kind], flights, seconds, told) for kind in inertial}
+    rest = {kind: sensor_trial.at_rest(kind, devices[kind], flights, seconds, step) for kind in inertial}
     return Page(
         subject,
         rest,
@@ -143,36 +130,24 @@ def make(
     )
 
 
-def check_rates(subject: Subject, name: str) -> None:
-    """Refuse, before anything is computed, a sensor whose rate the trials cannot run at: ValueError with its `name`."""
-    try:
-        sensor_trial.check_rates(subject.devices)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
-
-
 def _inertial_effects(kind: str, params: Any, rest: AtRest) -> list[Row]:
     """Of a gyro or an accelerometer, in the unit of its full scale."""
-    rows: list[Row]
     if kind == "gyro":
-        rows = [
+        return [
             ("sigma of a sample", rest.sample_sigma, "deg/s"),
             ("step of a reading", rest.step, "deg/s"),
             ("full scale", params.range_deg_s, "deg/s"),
             (f"angle after {DRIFT_S:.0f} s, white noise alone", rest.noise.white * math.sqrt(DRIFT_S), "deg"),
             (f"angle after {DRIFT_S:.0f} s, turn-on bias", params.bias_deg_s * DRIFT_S, "deg"),
         ]
-    else:
-        tilt_deg = math.degrees(math.atan(1e-6 * rest.sample_sigma))
-        rows = [
-            ("sigma of a sample", 1e-3 * rest.sample_sigma, "mg"),
-            ("step of a reading", 1e-3 * rest.step, "mg"),
-            ("full scale", params.range_g, "g"),
-            ("tilt read from a sample, sigma", tilt_deg, "deg"),
-            ("tilt read from 1 s, sigma", math.degrees(math.atan(1e-6 * rest.noise.white)), "deg"),
-            ("tilt by the bias, sigma", math.degrees(math.atan(params.bias_g)), "deg"),
-        ]
-    return rows
+    return [
+        ("sigma of a sample", 1e-3 * rest.sample_sigma, "mg"),
+        ("step of a reading", 1e-3 * rest.step, "mg"),
+        ("full scale", params.range_g, "g"),
+        ("tilt read from a sample, sigma", math.degrees(math.atan(1e-6 * rest.sample_sigma)), "deg"),
+        ("tilt read from 1 s, sigma", math.degrees(math.atan(1e-6 * rest.noise.white)), "deg"),
+        ("tilt by the bias, sigma", math.degrees(math.atan(params.bias_g)), "deg"),
+    ]
 
 
 def _supply_effects(kind: str, params: Any, board: BoardParams) -> list[Row]:
@@ -215,8 +190,8 @@ def _magnetic_effects(params: Any, trial: MagneticTrial) -> list[Row]:
     ]
 
 
-def _air_effects(kind: str, params: Any, trial: AirTrial) -> list[Row]:
-    errors = trial.errors(kind)
+def _air_effects(kind: str, params: Any, trial: Log) -> list[Row]:
+    errors = air_errors(trial, kind)
     what, unit = ("airspeed", "m/s") if kind == "airspeed" else ("height", "m")
     return [
         ("sample rate", params.rate_hz, "Hz"),
@@ -275,15 +250,12 @@ def _coefficients(rest: AtRest) -> Any:
     for name, c in rest.coefficients.items():
         stated = _number(c.datasheet) if c.datasheet else "-"
         hidden = name == "rate_random_walk" and rest.walk_is_hidden
-        difference = "too small to see" if hidden else _percent(c)
+        percent = "" if c.difference is None else f"{100.0 * c.difference:+.1f} %"
+        difference = "too small to see" if hidden else percent
         rows.append([NAMES[name], _number(c.measured), stated, difference, c.unit])
     headings = ("", "simulated", "stated", "difference", "")
     title = f"{_title(rest.kind)}: {rest.axis_hours:.0f} axis-hours at rest, {IMU_HZ} Hz, before the converter"
     return console.table(title, headings, rows, text=(0, 4))
-
-
-def _percent(c: Coefficient) -> str:
-    return f"{100.0 * c.difference:+.1f} %" if c.difference is not None else ""
 
 
 def _number(value: Any) -> str:

@@ -11,10 +11,10 @@ from typing import Any, Final
 
 import matplotlib
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.interface import G_M_S2, Array
+from scenarios.harness import picture_style as style
 from scenarios.harness.cli.reports import write_figure
 from scenarios.harness.commands.sensors import NAMES, Page
 from scenarios.harness.picture_style import BLUE, DPI, FAINT, GREEN, GRID, INK, ORANGE, RED, STYLE, VIOLET
@@ -33,16 +33,16 @@ def draw(page: Page, path: Path) -> None:
     rows = _rows(page)
     if not rows:
         raise ValueError(f"{page.subject.name}: there is nothing to draw of it")
-    height = ROW * len(rows) + 1.25
+    height = ROW * len(rows) + 1.35
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, height), facecolor="white")
-        FigureCanvasAgg(figure)
-        edges = {"left": 0.06, "right": 0.965, "top": 1.0 - 1.3 / height, "bottom": 0.62 / height}
+        edges = {"left": 0.06, "right": 0.965, "top": 1.0 - 1.4 / height, "bottom": 0.62 / height}
         grid = figure.add_gridspec(len(rows), 30, hspace=0.36, wspace=0.0, **edges)
         for i, row in enumerate(rows):
             for (first, last), panel in zip(((0, 12), (14, 22), (24, 30)), row, strict=False):
                 panel(figure.add_subplot(grid[i, first:last]))
-        _heading(figure, page, height)
+        about = page.subject
+        style.heading(figure, 0.06, 0.965, plotted(about.name), plotted(about.about, 160), "wingslevel sensors")
         write_figure(path, figure, DPI)
 
 
@@ -52,81 +52,64 @@ def _rows(page: Page) -> list[list[Panel]]:
     log = page.exercise
     for kind, rest in page.at_rest.items():
         if log is not None and np.any(rest.variances > 0.0):
-            rows.append(
-                [
-                    partial(_allan, rest=rest),
-                    partial(_exercise, kind=kind, log=log),
-                    partial(_still, kind=kind, log=log),
-                ]
-            )
+            moved = [partial(panel, kind=kind, log=log) for panel in (_exercise, _still)]
+            rows.append([partial(_allan, rest=rest), *moved])
     if page.response is not None:
         rows.append([partial(panel, r=page.response) for panel in (_course, _speed, _track)])
     if page.magnetic is not None:
         rows.append([partial(panel, trial=page.magnetic) for panel in (_heading_error, _level_field)])
     if page.air is not None:
         fitted = [kind for kind in ("airspeed", "barometer") if kind in page.subject.devices]
-        rows.append([partial(_air, kind=kind, log=page.air.log) for kind in fitted])
+        rows.append([partial(_air, kind=kind, log=page.air) for kind in fitted])
     return rows
-
-
-def _heading(figure: Any, page: Page, height: float) -> None:
-    about = page.subject
-    figure.text(0.06, 1.0 - 0.52 / height, plotted(about.name), fontsize=25, fontweight="bold", color=INK)
-    figure.text(0.06, 1.0 - 0.8 / height, plotted(about.about, 160), fontsize=10.5, color=FAINT)
-    figure.text(0.965, 1.0 - 0.45 / height, "wingslevel sensors", fontsize=10.5, color=FAINT, ha="right")
 
 
 def _allan(ax: Any, rest: AtRest) -> None:
     """Mean Allan deviation of all axes, the middle nine tenths of them, and the three asymptotes stated."""
-    tau = rest.tau_s
+    tau, stated = rest.tau_s, rest.stated
     low, high = (np.sqrt(np.quantile(rest.variances, share, axis=1)) for share in (0.05, 0.95))
-    mean = rest.deviation
     ax.fill_between(tau, low, high, color=BLUE, alpha=0.16, lw=0, label="nine axes in ten, an hour each")
-    ax.loglog(tau, mean, "o-", color=BLUE, ms=4.5, mec="white", mew=0.8, label=f"{rest.axis_hours:.0f} axis-hours")
+    hours = f"{rest.axis_hours:.0f} axis-hours"
+    ax.loglog(tau, rest.deviation, "o-", color=BLUE, ms=4.5, mec="white", mew=0.8, label=hours)
     floor, top = 0.45 * float(low.min()), 1.8 * float(high.max())
-    if np.any(rest.stated.deviation(tau) > 0.0):
-        ax.loglog(tau, rest.stated.deviation(tau), color=INK, lw=1.1, ls=(0, (4, 2)), label="as stated", zorder=4)
+    if np.any(stated.deviation(tau) > 0.0):
+        ax.loglog(tau, stated.deviation(tau), color=INK, lw=1.1, ls=(0, (4, 2)), label="as stated", zorder=4)
     ax.set(xlim=(float(tau[0]) / 1.25, float(tau[-1]) * 1.25), ylim=(floor, top))
     unit = rest.unit.replace("ug", "µg")
-    stated = rest.stated
-    _asymptote(ax, rest, stated.white / np.sqrt(tau), ORANGE, f"N = {stated.white:.3g} {unit}·√s", 0.8, (-12.0, -8.0))
-    flat = math.sqrt(allan.FLICKER) * stated.flicker
-    _asymptote(ax, rest, np.full_like(tau, flat), GREEN, f"0.664 B, B = {stated.flicker:.3g} {unit}", 0.0, (0.0, 8.0))
-    _asymptote(
-        ax, rest, stated.walk * np.sqrt(tau / 3.0), VIOLET, f"K = {stated.walk:.3g} {unit}/√s", 0.6, (-10.0, 7.0)
-    )
+    flat, walk = np.full_like(tau, math.sqrt(allan.FLICKER) * stated.flicker), stated.walk * np.sqrt(tau / 3.0)
+    _asymptote(ax, tau, stated.white / np.sqrt(tau), ORANGE, f"N = {stated.white:.3g} {unit}·√s", 0.8, (-12.0, -8.0))
+    _asymptote(ax, tau, flat, GREEN, f"0.664 B, B = {stated.flicker:.3g} {unit}", 0.0, (0.0, 8.0))
+    _asymptote(ax, tau, walk, VIOLET, f"K = {stated.walk:.3g} {unit}/√s", 0.6, (-10.0, 7.0))
     ax.set(xlabel="averaged over τ, s", ylabel=f"Allan deviation, {unit}")
     ax.legend(loc="upper right")
-    words = [f"{NAMES[n]} {_told(c.measured, c.datasheet)}" for n, c in rest.coefficients.items() if c.datasheet]
-    words = [w for w in words if not (w.startswith("random walk") and rest.walk_is_hidden)]
-    ax.text(0.0, 1.012, "     ".join(words), transform=ax.transAxes, fontsize=7.8, color=FAINT)
+    words = [
+        f"{NAMES[name]} {c.measured:.3g}, {100.0 * c.difference:+.1f} %"
+        for name, c in rest.coefficients.items()
+        if c.difference is not None and not (name == "rate_random_walk" and rest.walk_is_hidden)
+    ]
+    style.note(ax, "     ".join(words))
     ax.set_title(f"{rest.kind.capitalize()} at rest, before the converter", pad=15)
 
 
-def _told(measured: float, stated: float) -> str:
-    return f"{measured:.3g}, {100.0 * (measured / stated - 1.0):+.1f} %"
-
-
 def _asymptote(
-    ax: Any, rest: AtRest, line: Array, colour: str, text: str, where: float, offset: tuple[float, float]
+    ax: Any, tau: Array, line: Array, colour: str, text: str, where: float, offset: tuple[float, float]
 ) -> None:
     """One term alone, with its name beside it at the part `where` of what is visible of it."""
-    tau, (floor, top) = rest.tau_s, ax.get_ylim()
+    floor, top = ax.get_ylim()
     seen = (line > 1.15 * floor) & (line < 0.8 * top)
     if not seen.any():
         return
     ax.plot(tau, line, color=colour, lw=1.0)
     x = np.exp(np.interp(where, [0.0, 1.0], np.log(tau[seen][[0, -1]])))
     y = float(np.exp(np.interp(math.log(x), np.log(tau), np.log(line))))
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.6}
     ax.annotate(
         text, (x, y), offset, textcoords="offset points", fontsize=8.3, color=colour,
-        ha="right" if offset[0] else "left", va="center", bbox=box, zorder=6,
+        ha="right" if offset[0] else "left", va="center", bbox=style.BOX, zorder=6,
     )  # fmt: skip
 
 
 def _signal(kind: str, log: Log) -> tuple[Array, Array, Array]:
-    """Time, truth and reading of the exercised axis: roll rate, or the load along the aeroplane's up."""
+    """Time, truth and reading of the exercised axis: roll rate in deg/s, or load factor in g."""
     t_s = log.truth["t_s"]
     if kind == "gyro":
         truth, reading = log.truth["imu_omega_b_rad_s"][:, 0], log.measured["gyro_b_rad_s"][:, 0]
