@@ -249,10 +249,10 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
     groups: dict[str, list[tuple[bool, dict[str, Any]]]] = {}
     for outcome in ("passed", "failed", "xfailed", "xpassed"):
         for report in terminalreporter.stats.get(outcome, ()):
-            told = dict(report.user_properties)
-            if report.when == "call" and "flight" in told:
-                pair = str(told["flight"]).rpartition(", seed ")[0]
-                groups.setdefault(pair, []).append((outcome != "failed", told))
+            properties = dict(report.user_properties)
+            if report.when == "call" and "flight" in properties:
+                pair = str(properties["flight"]).rpartition(", seed ")[0]
+                groups.setdefault(pair, []).append((outcome != "failed", properties))
     if not groups:
         return
     terminalreporter.write_sep("=", "flights")
@@ -269,7 +269,7 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 def _rms(flights: Sequence[tuple[bool, Mapping[str, Any]]], number: str) -> str:
     """Root of the mean square over flights, and the worst."""
-    values = [float(told[number]) for _, told in flights if number in told]
+    values = [float(properties[number]) for _, properties in flights if number in properties]
     if not values:
         return "none"
     pooled = math.sqrt(sum(value**2 for value in values) / len(values))

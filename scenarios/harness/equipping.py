@@ -204,15 +204,15 @@ def learnt(estimator: object, known: Mapping[str, Known]) -> dict[str, Known]:
             return dict(known)
         if not isinstance(found, Mapping):
             raise Refused(f"learnt is {shown(found)}, must be a mapping from properties of the instruments to values")
-        told = {}
+        reported = {}
         for name, value in found.items():  # not more than there are properties: others are refused
             if not isinstance(name, str) or not isinstance(value, numbers.Real):
                 raise Refused(f"learnt holds {shown(name)}: {shown(value)}, must hold names and numbers")
             try:
-                told[str(name)] = Known(property_value(name, value), "learnt")
+                reported[str(name)] = Known(property_value(name, value), "learnt")
             except ValueError as error:
                 raise Refused(f"learnt: {error}") from error
-        return {**known, **told}
+        return {**known, **reported}
 
 
 def uses_of(estimator: object, instead: tuple[str, ...]) -> tuple[str, ...]:

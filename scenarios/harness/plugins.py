@@ -84,13 +84,13 @@ def short_name(spec: "str | Maker") -> str:
 def maker_name(spec: "str | Maker") -> str:
     """What an estimator is called that is given by name, or by what makes it: ``package.module:Class``.
 
-    What `functools.partial` sets is told behind it.
+    What `functools.partial` sets follows in brackets.
     """
     if isinstance(spec, str):
         return spec
     if isinstance(spec, partial):
-        told = [*map(shown, spec.args), *(f"{name}={shown(value)}" for name, value in spec.keywords.items())]
-        return f"{maker_name(spec.func)}({', '.join(told)})"
+        settings = [*map(shown, spec.args), *(f"{name}={shown(value)}" for name, value in spec.keywords.items())]
+        return f"{maker_name(spec.func)}({', '.join(settings)})"
     try:
         name = getattr(spec, "__qualname__", None) or class_name(spec)
         return printable(f"{spec.__module__}:{name}")

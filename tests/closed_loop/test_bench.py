@@ -91,7 +91,7 @@ def test_flown_again_from_its_manifest_with_a_turned_magnetometer_is_bit_equal(n
 )
 def test_air_that_moves_over_the_table_is_refused(air):
     """One line that says why."""
-    with pytest.raises(ValueError, match="table indoors, where no air moves") as refused:
+    with pytest.raises(ValueError, match="table indoors, in still air") as refused:
         override(find("bench_rest").config, air)
     assert "\n" not in str(refused.value)
 

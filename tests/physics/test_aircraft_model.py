@@ -140,7 +140,7 @@ def test_lateral_stiffness_is_that_of_the_class(model):
 BROKEN = """
 import shutil, sys
 from pathlib import Path
-from sim import jsbsim_model
+from sim.aeroplane import jsbsim_model
 copy = Path(sys.argv[1])
 shutil.copytree(jsbsim_model.AIRCRAFT / "endurance", copy / "endurance")
 model = copy / "endurance" / "endurance.xml"

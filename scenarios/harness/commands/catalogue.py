@@ -27,7 +27,7 @@ def catalogue() -> dict[str, dict[str, str]]:
 def ours() -> dict[str, dict[str, str]]:
     """As `catalogue`, without what installed packages offer."""
     return {
-        "scenarios": {n: told for p in (_ROOT / "scenarios").glob("[!_]*.py") for n, told in _scenarios(p).items()},
+        "scenarios": {n: lines for p in (_ROOT / "scenarios").glob("[!_]*.py") for n, lines in _scenarios(p).items()},
         **{kind: {name: _about(where) for name, where in code.items()} for kind, code in plugins.OURS.items()},
         "aircraft": aircraft(),
         "suites": sensor_suites(),
@@ -38,11 +38,11 @@ def ours() -> dict[str, dict[str, str]]:
 def _scenarios(path: Path) -> dict[str, str]:
     """The scenario of a file and its variants, each with a line about it."""
     tree = _tree(path)
-    told = {path.stem: _first_line(tree)}
+    lines = {path.stem: _first_line(tree)}
     for node in tree.body:
         if isinstance(node, ast.Assign) and any(isinstance(t, ast.Name) and t.id == "VARIANTS" for t in node.targets):
-            told |= {f"{path.stem}_{ending}": line for ending, line in ast.literal_eval(node.value).items()}
-    return told
+            lines |= {f"{path.stem}_{ending}": line for ending, line in ast.literal_eval(node.value).items()}
+    return lines
 
 
 def aircraft() -> dict[str, str]:

@@ -107,15 +107,15 @@ def _results(tasks: Sequence[Flyable[_Result]], workers: int, limit_s: float | N
                     worker.take(i, tasks[i])
             _wait(crew)
             for worker in crew:
-                told = worker.look()
-                if isinstance(told, _Gone) and not told.timed_out and lives[worker.number] > 1:
+                found = worker.look()
+                if isinstance(found, _Gone) and not found.timed_out and lives[worker.number] > 1:
                     lives[worker.number] -= 1
                     waiting.appendleft(worker.number)
-                elif isinstance(told, _Gone):
-                    outcome = Outcome.TIMED_OUT if told.timed_out else Outcome.WORKER_DIED
-                    yield worker.number, tasks[worker.number].lost(outcome, told.message)
-                elif told is not None:
-                    yield worker.number, told.result
+                elif isinstance(found, _Gone):
+                    outcome = Outcome.TIMED_OUT if found.timed_out else Outcome.WORKER_DIED
+                    yield worker.number, tasks[worker.number].lost(outcome, found.message)
+                elif found is not None:
+                    yield worker.number, found.result
     finally:
         for worker in crew:
             worker.end()
@@ -138,7 +138,7 @@ class _Gone:
 
 
 @dataclass(frozen=True, slots=True)
-class _Told(Generic[_Result]):
+class _Done(Generic[_Result]):
     """The result of a task."""
 
     result: _Result
@@ -152,13 +152,13 @@ class _Worker(Generic[_Result]):
 
     inside = False
 
-    def __init__(self, limit_s: float | None, told: Any) -> None:
+    def __init__(self, limit_s: float | None, announced: Any) -> None:
         self.number = -1  # of the task
         self.busy = False
         self.future: Future[Any] | None = None
         self.deadline_s: float | None = None
         self._limit_s = limit_s
-        self._told = told  # shared by all processes: whether the compile line has been printed
+        self._announced = announced  # shared by all processes: whether the compile line has been printed
         self._task: Flyable[_Result] | None = None
         self._pool: ProcessPoolExecutor | None = None
         self._process: Any = None
@@ -181,13 +181,13 @@ class _Worker(Generic[_Result]):
         context, others = multiprocessing.get_context("spawn"), set(multiprocessing.active_children())
         # Without locks: a process killed while holding one would block the others.
         self._extended_s = context.Value("d", 0.0, lock=False)
-        arguments = os.getpid(), self._extended_s, self._told, tracebacks_shown(), lent.packed()
+        arguments = os.getpid(), self._extended_s, self._announced, tracebacks_shown(), lent.packed()
         self._pool = ProcessPoolExecutor(1, mp_context=context, initializer=_set_up, initargs=arguments)
         with _held_back(), _without_main():
             self.future = self._pool.submit(os.getpid)
         self._process = next(iter(set(multiprocessing.active_children()) - others), None)
 
-    def look(self) -> "_Told[_Result] | _Gone | None":
+    def look(self) -> "_Done[_Result] | _Gone | None":
         """The result of the task; None while it runs."""
         if self.future is None:
             return None
@@ -211,7 +211,7 @@ class _Worker(Generic[_Result]):
                 return self._gone()
             return None
         self.busy = False
-        return _Told(result)
+        return _Done(result)
 
     def end(self) -> None:
         """Kill the process."""
@@ -273,7 +273,7 @@ def _how(exitcode: int | None) -> str:
     return "ended by itself" + ("" if exitcode is None else f" (exit code {exitcode})")
 
 
-def _set_up(parent: int, extended_s: Any, told: Any, tracebacks: bool, makers: dict[str, bytes]) -> None:
+def _set_up(parent: int, extended_s: Any, announced: Any, tracebacks: bool, makers: dict[str, bytes]) -> None:
     """In a new process."""
     _Worker.inside = True
     end_with_parent(parent)
@@ -284,7 +284,7 @@ def _set_up(parent: int, extended_s: Any, told: Any, tracebacks: bool, makers: d
         extended_s.value += seconds
 
     def tell(_progress: compiling.Progress) -> None:
-        first, told.value = not told.value, True
+        first, announced.value = not announced.value, True
         if first:
             console.note(console.COMPILING)
         compiling.on_compile(None)
