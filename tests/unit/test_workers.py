@@ -117,10 +117,9 @@ def test_results_are_handed_on_as_they_come(tmp_path: Path) -> None:
 
 def test_workers_end_when_the_process_that_began_them_is_killed(tmp_path: Path) -> None:
     """Also one that hangs in a loop that answers nothing."""
-    program = f"""
+    tasks = f"""
         import os
         from pathlib import Path
-        from scenarios.harness.gate.workers import fly_each
 
         class Hang:
             def fly(self):
@@ -129,15 +128,21 @@ def test_workers_end_when_the_process_that_began_them_is_killed(tmp_path: Path) 
                     pass
             def lost(self, outcome, message):
                 return None
+    """
+    program = """
+        from hanging import Hang
+        from scenarios.harness.gate.workers import fly_each
 
         if __name__ == "__main__":
             fly_each([Hang(), Hang()], 2, lambda done, total: None)
     """
+    (tmp_path / "hanging.py").write_text(textwrap.dedent(tasks), encoding="utf-8")
     script = tmp_path / "parent.py"
     script.write_text(textwrap.dedent(program), encoding="utf-8")
-    root = Path(__file__).resolve().parents[2]
-    parent = subprocess.Popen([sys.executable, script], env={**os.environ, "PYTHONPATH": str(root)})
+    search = os.pathsep.join([str(Path(__file__).resolve().parents[2]), str(tmp_path)])
+    parent = subprocess.Popen([sys.executable, script], env={**os.environ, "PYTHONPATH": search})
     pids = waited_for(lambda: [int(path.name) for path in tmp_path.iterdir() if path.name.isdigit()], 2)
+    assert len(pids) == 2
     parent.kill()
     parent.wait()
     assert waited_for(lambda: [pid for pid in pids if not alive(pid)], 2) == pids
