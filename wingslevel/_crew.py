@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, SupportsIndex
 
 from wingslevel._conditions import Estimator, plain
 from wingslevel._errors import WingslevelError, WingslevelWarning, one_line
@@ -32,7 +32,7 @@ def objects(estimators: Mapping[str, Any]) -> dict[str, Any]:
     return {name: estimator for name, estimator in estimators.items() if not isinstance(estimator, str)}
 
 
-def crew(workers: int | None, estimators: Mapping[str, Any]) -> int:
+def crew(workers: SupportsIndex | None, estimators: Mapping[str, Any]) -> int:
     """How many worker processes; 0 is this process.
 
     workers : as the user says; None is as many as processors, and this process where one cannot be sent to others
@@ -56,8 +56,8 @@ def crew(workers: int | None, estimators: Mapping[str, Any]) -> int:
             return 0
         if why:
             raise WingslevelError(
-                f"workers = {number}: estimator {name!r} cannot be sent to other processes, for {why}; move it to a "
-                'file and name it "file.py:Class", or leave workers out, which flies in this process'
+                f"workers = {number}: estimator {name!r} cannot be sent to other processes, because {why}; move it to "
+                'a file and name it "file.py:Class", or leave workers out, which flies in this process'
             )
     return processors() if number is None else int(number)
 
