@@ -151,9 +151,7 @@ def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
         return kept[0]
 
     # Not by record_property, which warns under --junitxml.
-    request.node.user_properties.append(
-        ("flight", f"{flight.scenario}, {_name(flight.estimator)}, seed {flight.seed}")
-    )
+    request.node.user_properties.append(("flight", f"{flight.scenario}, {_name(flight.estimator)}, seed {flight.seed}"))
     request.node.user_properties.extend(
         (number, value) for number in _NUMBERS if (value := flight.metrics.get(number)) is not None
     )
