@@ -6,6 +6,7 @@ kernels are cached with the name of their module.  Kernels of a file with a name
 separate folder, so that any process can load them.
 """
 
+import ast
 import hashlib
 import importlib
 import importlib.util
@@ -19,7 +20,10 @@ from typing import NamedTuple
 from sim.outside.blame import Refused, theirs
 
 PREFIX = "wingslevel"
+_PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
+_HOME = Path(__file__).resolve().parents[2]
 LIBRARIES = (".so", ".dylib", ".dll")
+SOURCES = (".c", ".cc", ".cpp", ".cxx", ".c++", ".h", ".hpp", ".rs")
 _run: dict[str, ModuleType] = {}  # modules that were made here, by name
 _running: set[Path] = set()  # files whose code is being run
 
@@ -49,6 +53,27 @@ def library_named(spec: str) -> Library | None:
     return Library(Path(file), prefix) if colon and file.endswith(LIBRARIES) else None
 
 
+def hint_for_file(spec: str, *, libraries: bool) -> str:
+    """What to write instead of `spec`, if that is a Python file without a class, or a source file; empty otherwise.
+
+    libraries : whether a shared library can be used as well
+    """
+    file = next((each for each in (spec, spec.rpartition(":")[0]) if each.endswith(SOURCES)), "")
+    if file and libraries:
+        return f"{file} is a source file: build a shared library from it first (docs/c_estimators.md)"
+    path = Path(spec)
+    if path.suffix != ".py":
+        return ""
+    if not path.is_file():
+        return f"no file {spec!r}"
+    try:
+        classes = [node for node in ast.parse(path.read_bytes()).body if isinstance(node, ast.ClassDef)]
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):  # anyone's file
+        classes = []
+    classes.sort(key=lambda node: all(getattr(each, "name", "") != "update" for each in node.body))
+    return f"{spec}: name the class in it, for instance {spec}:{classes[0].name if classes else 'Class'}"
+
+
 def module_of_file(path: Path, refuse: Callable[[str], Exception]) -> ModuleType:
     """The module in the file at `path`; its folder can be imported from, after everything installed.
 
@@ -60,11 +85,34 @@ def module_of_file(path: Path, refuse: Callable[[str], Exception]) -> ModuleType
         raise refuse(f"no file {str(path)!r}")
     path = path.resolve()
     also_import_from(path.parent)
+    hidden = next(_modules_hidden_by_ours(path), None)
+    if hidden is not None:
+        raise refuse(f"{path.name} imports {hidden.stem!r}, a package of wingslevel: rename your own {hidden}")
     with theirs(refuse, str(path)):
         imported = sys.modules.get(path.stem)
         if imported is not None and imported is not _run.get(path.stem) and _is_in(imported, path):
             return imported  # by an import statement
         return _executed(path)
+
+
+def _modules_hidden_by_ours(path: Path) -> Iterator[Path]:
+    """Modules beside the file at `path` that it imports, but that a package of wingslevel of the same name hides."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError):
+        return  # reported when it is run
+    for node in ast.walk(tree):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module in _PACKAGES:
+            package = importlib.import_module(node.module)
+            is_ours = (
+                hasattr(package, a.name) or importlib.util.find_spec(f"{node.module}.{a.name}") for a in node.names
+            )
+            names = [] if all(is_ours) else [node.module]
+        for name in names:
+            for beside in (path.parent / f"{name}.py", path.parent / name):
+                if name in _PACKAGES and beside.exists() and beside not in (path, _HOME / name):
+                    yield beside
 
 
 def also_import_from(folder: Path) -> None:

@@ -90,7 +90,7 @@ def test_check_flies_here_what_cannot_be_sent(estimator: Any, why: str) -> None:
     """Without `workers` they fly in this process, with several they are refused."""
     result = wl.check("crosswind", estimator=estimator, **SHORT)
     assert [flight.outcome for flight in result.flights] == ["completed"] * 2
-    with pytest.raises(wl.WingslevelError, match=rf"cannot be sent .*, {why}.*file\.py:Class") as refused:
+    with pytest.raises(wl.WingslevelError, match=rf"cannot be sent .* {why}.*file\.py:Class") as refused:
         wl.check("crosswind", estimator=estimator, workers=2, **SHORT)
     assert "\n" not in str(refused.value)
 

@@ -161,14 +161,14 @@ def one_line(capfd) -> str:
             "scenario mine: script: ZeroDivisionError: division by zero (mine.py, line 17, in",
         ),
         ("def script(config): raise GeneratorExit", "GeneratorExit: no message (mine.py, line 17, in script)"),
-        ("def script(config): return None", "script: it returned None, must return a Script"),
-        ("def script(config): return Script([(0.0, 'up')])", "at 0 s it asks for 'up', must be a Setpoint"),
-        ("def script(config): return Script([(0.0, Setpoint(77))])", "asks for mode 77, must be a Mode"),
+        ("def script(config): return None", "script: it returned None; it must return a Script"),
+        ("def script(config): return Script([(0.0, 'up')])", "at 0 s it asks for 'up'; it must ask for a Setpoint"),
+        ("def script(config): return Script([(0.0, Setpoint(77))])", "asks for mode 77; it must ask for a Mode"),
         ("def script(config): return Script([])", "Script: no setpoint; give at least one"),
         ("metric = 3", "checks is (Check(name='survived'"),
-        ("CONFIG = {}", "config is {}, must be a FlightConfig"),
-        ("script = None", "script is None, must be a function"),
-        ("moments = 'noon'", "milestones is {'half-way': 'noon'}, must be functions by names"),
+        ("CONFIG = {}", "config is {}; it must be a FlightConfig"),
+        ("script = None", "script is None; it must be a function"),
+        ("moments = 'noon'", "milestones is {'half-way': 'noon'}; it must be functions by names"),
         ("Scenario = dict", "TypeError: dict expected at most 1 argument, got 6 (mine.py, line 18)"),
         ("def Scenario(*a): return None", "must export SCENARIO, a Scenario; it is None"),
         ("def Check(*a): return SURVIVED", "checks named twice: survived (mine.py, line 18)"),
@@ -188,7 +188,7 @@ def test_scenario_file_with_a_fault_is_one_line_and_exit_code_2(here: Path, capf
         ("def metric(flight): 1 / 0", "ZeroDivisionError: division by zero (mine.py, line 17, in metric)"),
         ("def metric(flight): raise SystemExit(0)", "SystemExit: 0 (mine.py, line 17, in metric)"),
         ("def metric(flight): raise StopIteration", "StopIteration: no message (mine.py, line 17, in metric)"),
-        ("def metric(flight): return True", "its metric returned True, must return a Measured"),
+        ("def metric(flight): return True", "its metric returned True; it must return a Measured"),
         ("def metric(flight): return Measured('low')", "ValueError: could not convert string to float: 'low'"),
         (
             "def moments(flight): raise KeyboardInterrupt",
@@ -245,3 +245,27 @@ def test_script_that_raises_for_one_seed_fails_that_flight_and_loses_no_other(he
     assert flights[1]["message"] == "scenario mine: script: SystemExit: 0 (mine.py, line 18, in script)"
     assert not flights[1]["passed"]
     assert flights[1]["message"] in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("line", "is_refused"),
+    [
+        ("import sim", True),
+        ("from sim import SCALE", True),
+        ("import sim.loop", False),
+        ("from sim import loop", False),
+    ],
+)
+def test_own_module_that_a_package_of_ours_hides_is_named(here: Path, line: str, is_refused: bool) -> None:
+    """Not silently our package in place of the user's sim.py; an import that only ours can give is left alone."""
+    Path("sim.py").write_text("SCALE = 2.0\n", encoding="utf-8")
+    Path("own.py").write_text(
+        f"{line}\n\nclass Mine:\n    def update(self, m):\n        return None\n", encoding="utf-8"
+    )
+    if is_refused:
+        with pytest.raises(
+            ValueError, match=r"own\.py imports 'sim', a package of wingslevel: rename your own .*sim\.py"
+        ):
+            load_estimator("own.py:Mine")
+    else:
+        load_estimator("own.py:Mine")
