@@ -57,8 +57,12 @@ class Row:
     @property
     def value_text(self) -> str:
         """The measured value with its unit, and the note: ``2.04 m``, ``not measured (3 of 4 samples)``."""
-        value = f"{self.figure} {self.unit}".strip() if math.isfinite(self.measured) else NOT_MEASURED
-        return f"{value} ({self.note})" if self.note else value
+        return f"{self.with_unit} ({self.note})" if self.note else self.with_unit
+
+    @property
+    def with_unit(self) -> str:
+        """The measured value with its unit: ``2.04 m``, ``not measured``."""
+        return f"{self.figure} {self.unit}".strip() if math.isfinite(self.measured) else NOT_MEASURED
 
     @property
     def limit_text(self) -> str:
@@ -72,9 +76,9 @@ class Row:
 
 
 def figures(value: float) -> str:
-    """`value` to three significant digits; powers of ten outside 0.001..99999; ``none`` if it is not finite."""
+    """`value` to three significant digits; powers of ten outside 0.001..99999; `NOT_MEASURED` if not finite."""
     if not math.isfinite(value):
-        return "none"
+        return NOT_MEASURED
     if value == 0.0:
         return "0"
     if not 1e-3 <= abs(value) < 1e5:

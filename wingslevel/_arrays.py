@@ -2,17 +2,19 @@
 
 import warnings
 from collections.abc import Mapping
-from typing import Any, NotRequired, TypedDict
+from typing import Any, NotRequired, SupportsFloat, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from wingslevel._attitudes import Attitudes
-from wingslevel._conditions import Estimator, plain
+from wingslevel._conditions import Estimator, number_of, params_of, plain
 from wingslevel._errors import WingslevelError, WingslevelWarning, one_line
 
 Array = NDArray[np.float64]
 FASTEST_RAD_S, LEAST_M_S2 = 3.0, 4.0  # medians of a gyro in deg/s, of an accelerometer in g
+INTERVAL_S = (1e-5, 0.5)  # plausible medians of the sample interval
+FIELD_UT = (2.0, 200.0)  # plausible medians of a magnetometer; the field of the earth has 22 to 67
 
 
 class GpsArrays(TypedDict):
@@ -55,7 +57,7 @@ def estimate(
     air: AirArrays | None = None,
     estimator: Estimator = "premerlani",
     params: Mapping[str, Any] | None = None,
-    calibration_s: float = 2.0,
+    calibration_s: SupportsFloat = 0.0,
 ) -> Attitudes:
     """Estimate the attitude from arrays of measurements, in one call.
 
@@ -67,7 +69,9 @@ def estimate(
     gps, mag, air   measurements of other instruments, see `GpsArrays`, `MagArrays`, `AirArrays`
     estimator       registered name, ``module:Class``, ``file.py:Class``, a class, or a function that makes a new one
     params          its parameters by name, and what is known of the instruments, ``{"gps_latency_s": 0.3}``
-    calibration_s   at the start, averaged for the power-up where it is at rest in them; 0 is none
+    calibration_s   seconds at the start whose mean gives tilt and gyro offset at power-up.  Ask for it only if the
+                    device is at rest then: a slow steady turn cannot be told from a gyro offset.  0 is none; a start
+                    that moves too much is not used.  `Attitudes.calibration_b_rad_s` is the offset that was taken
 
     Returns
     -------
@@ -82,8 +86,8 @@ def estimate(
 
     with one_line():
         log = _log(t_s, gyro_b_rad_s, force_b_m_s2, gps, mag, air)
-        settings = {str(name): plain(value) for name, value in (params or {}).items()}
-        replayed = replay(log, plain(estimator), settings, Window(calibration_s=float(calibration_s)))
+        window = Window(calibration_s=number_of("calibration_s", calibration_s))
+        replayed = replay(log, plain(estimator), params_of(params), window)
     if replayed.failure:
         raise WingslevelError(replayed.failure)
     return Attitudes(replayed)
@@ -106,6 +110,7 @@ def _log(t_s: Any, gyro: Any, force: Any, gps: Any, mag: Any, air: Any) -> Any:
     rows = np.zeros(n, MEASURED_DTYPE)
     rows["t_s"] = _times(t_s, n)
     steps = np.diff(rows["t_s"])
+    _warn_of_interval(float(np.median(steps)))
     rows["dt_s"] = np.concatenate(([np.median(steps)], steps))
     rows["gyro_b_rad_s"], rows["force_b_m_s2"] = gyro_b_rad_s, force_b_m_s2
     rows["airspeed_m_s"] = rows["baro_height_m"] = np.nan
@@ -166,6 +171,13 @@ def _warn_of_units(gyro: Array, force: Array) -> None:
         warnings.warn(warned, WingslevelWarning, stacklevel=4)
 
 
+def _warn_of_interval(interval_s: float) -> None:
+    """Warn of a sample interval that no inertial sensor has."""
+    if not INTERVAL_S[0] <= interval_s <= INTERVAL_S[1]:
+        warned = f"t_s has a median interval of {interval_s:.3g} s, which is implausible: t_s must be in seconds"
+        warnings.warn(warned, WingslevelWarning, stacklevel=4)
+
+
 def _arrivals(name: str, given: Mapping[str, Any], fields: Mapping[str, int], rows: Any) -> dict[str, Any]:
     """Arrays of an instrument by field, with the row of each sample under "at" ("new" where rows have one)."""
     if not isinstance(given, Mapping):
@@ -187,7 +199,8 @@ def _arrivals(name: str, given: Mapping[str, Any], fields: Mapping[str, int], ro
     began_s = rows["t_s"][0] - rows["dt_s"][0]
     inside = (at < len(rows)) & (t_s > began_s - 1e-9)
     if not inside.any():
-        raise WingslevelError(f"{name}['t_s']: no sample between {began_s:.9g} s and {rows['t_s'][-1]:.9g} s")
+        first_s, last_s = (round(float(t), 9) + 0.0 for t in (began_s, rows["t_s"][-1]))
+        raise WingslevelError(f"{name}['t_s']: no sample between {first_s:.9g} s and {last_s:.9g} s")
     last = np.full(len(rows), -1)
     last[at[inside]] = np.flatnonzero(inside)  # of several in a row the last one stays
     found["new"], found["last"] = last >= 0, np.maximum.accumulate(last)
@@ -229,6 +242,10 @@ def _take_mag(rows: Any, given: Any) -> None:
     if field is None:
         raise WingslevelError("mag holds no 'field_b_ut'")
     good = np.isfinite(field).all(axis=1)
+    size_ut = np.linalg.norm(field[found["new"] & good], axis=1)
+    if len(size_ut) and not FIELD_UT[0] <= (median_ut := float(np.median(size_ut))) <= FIELD_UT[1]:
+        warned = f"mag['field_b_ut'] has a median size of {median_ut:.3g} uT: is it in gauss, milligauss or nanotesla?"
+        warnings.warn(warned, WingslevelWarning, stacklevel=4)
     rows["mag_new"], rows["mag_b_ut"] = found["new"] & good, np.where(good[:, None], field, 0.0)
 
 

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 class Attitudes:
     """What an estimator made of N inertial samples; every array has a row for each.
 
-    Before `first` it was still, and measured the offset of its gyros: these rows repeat the first estimate.
+    With a calibration, the rows before `first` were averaged for the power-up; they repeat the first estimate.
     """
 
     def __init__(self, replayed: "Replayed") -> None:
@@ -38,6 +38,13 @@ class Attitudes:
     def first(self) -> int:
         """The first row that the estimator was given; those before were averaged for its power-up."""
         return self._replayed.first
+
+    @property
+    def calibration_b_rad_s(self) -> Array | None:
+        """Shape (3,), gyro offset taken as the mean of the samples before `first`; None without a calibration."""
+        return (
+            np.asarray(self._replayed.log.measured["gyro_b_rad_s"][: self.first].mean(axis=0)) if self.first else None
+        )
 
     @property
     def t_s(self) -> Array:
@@ -125,7 +132,10 @@ class Attitudes:
         return pd.DataFrame(columns)
 
     def __repr__(self) -> str:
-        return f"<Attitudes of {self.estimator}, {len(self)} samples, {self.t_s[-1] - self.t_s[0]:.1f} s>"
+        taken = self.calibration_b_rad_s
+        offset = "" if taken is None else ", ".join(f"{rate + 0.0:.3g}" for rate in np.degrees(taken))
+        calibrated = f", calibrated over {self.first} samples: gyro offset ({offset}) deg/s" if offset else ""
+        return f"<Attitudes of {self.estimator}, {len(self)} samples, {self.t_s[-1] - self.t_s[0]:.1f} s{calibrated}>"
 
     def _repr_html_(self) -> str:
         roll, pitch, heading = self.euler_deg[-1]

@@ -3,15 +3,24 @@
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, SupportsFloat, SupportsIndex, Unpack
 
-from wingslevel._conditions import Conditions, Estimator, changes_of, plain, seeds_of, with_conditions
+from wingslevel._conditions import (
+    Conditions,
+    Estimator,
+    changes_of,
+    number_of,
+    path_of,
+    seeds_of,
+    shortly,
+    with_conditions,
+)
 from wingslevel._crew import crew, named, objects, quietly
 from wingslevel._errors import Interrupted, WingslevelError
 from wingslevel._progress import Progress, progress_of
 from wingslevel._results import CheckResult, Comparison
 
-Seeds = str | int | Iterable[int]
+Seeds = str | SupportsIndex | Iterable[SupportsIndex]
 
 
 @with_conditions
@@ -21,8 +30,8 @@ def check(
     seeds: Seeds = "0-9",
     estimator: Estimator | None = None,
     params: Mapping[str, Any] | None = None,
-    workers: int | None = None,
-    timeout: float | None = 600.0,
+    workers: SupportsIndex | None = None,
+    timeout: SupportsFloat | None = 600.0,
     ledger: str | os.PathLike[str] | None = None,
     progress: Progress = False,
     **conditions: Unpack[Conditions],
@@ -31,7 +40,7 @@ def check(
 
     Parameters
     ----------
-    scenarios       names, patterns as ``"gps_*"``, or ``file.py``: one or several; None is all that there are
+    scenarios       names, patterns as ``"gps_*"``, or ``file.py``: one or several; None is all of them
     seeds           ``"0-9"``, ``"0,2,5-7"``, or numbers; each seed is one flight of each scenario
     estimator       as for `fly`; None is that of each scenario
     params          parameters of the estimator by name
@@ -50,20 +59,20 @@ def check(
     from scenarios.harness.commands import check as command
     from scenarios.harness.gate.ledger import Ledger
 
-    changes = changes_of(conditions, params)
+    changes = changes_of(check, conditions, params)
     estimators = {} if estimator is None else named([estimator])
     limit_s = _limit_s(timeout)
     with quietly() as notes, lent.lend(objects(estimators)):
         names = _names(scenarios)
-        workers = crew(workers, estimators)
+        n_workers = crew(workers, estimators)
         if ledger is not None and objects(estimators):
             raise WingslevelError(
                 'ledger: name the estimator ("module:Class" or "file.py:Class"), whose files it reads'
             )
         tasks = command.tasks(names, seeds_of(seeds), next(iter(estimators), None), changes, keyed=ledger is not None)
-        kept = None if ledger is None else Ledger(Path(ledger))
+        kept = None if ledger is None else Ledger(Path(path_of("ledger", ledger)))
         with progress_of(progress, "flying", "flights") as advance:
-            run = command.fly_all(tasks, workers, advance, limit_s=limit_s, ledger=kept)
+            run = command.fly_all(tasks, n_workers, advance, limit_s=limit_s, ledger=kept)
     result = CheckResult(run, notes)
     if run.missing:
         raise Interrupted(result)
@@ -77,8 +86,8 @@ def compare(
     *,
     seeds: Seeds = "0-9",
     params: Mapping[str, Any] | None = None,
-    workers: int | None = None,
-    timeout: float | None = 600.0,
+    workers: SupportsIndex | None = None,
+    timeout: SupportsFloat | None = 600.0,
     progress: Progress = False,
     **conditions: Unpack[Conditions],
 ) -> Comparison:
@@ -87,7 +96,7 @@ def compare(
     Parameters
     ----------
     scenario        name or ``file.py``
-    estimators      one or several, each as for `fly`; None is all that there are
+    estimators      one or several, each as for `fly`; None is all of them
     params          parameters of all that have them, or, as ``"premerlani.k_p"``, of one
     seeds, workers, timeout, progress   as for `check`
 
@@ -99,32 +108,36 @@ def compare(
     from scenarios.harness import lent
     from scenarios.harness.commands import compare as command
 
-    changes = changes_of(conditions, params)
-    found = named(_several(estimators))
+    changes = changes_of(compare, conditions, params)
+    found = named(_several("estimators", estimators))
     limit_s = _limit_s(timeout)
     with quietly() as notes, lent.lend(objects(found)):
-        workers = crew(workers, found)
-        plan = command.prepare(os.fspath(scenario), list(found), seeds_of(seeds), changes)
+        n_workers = crew(workers, found)
+        plan = command.prepare(path_of("scenario", scenario), list(found), seeds_of(seeds), changes)
         with progress_of(progress, "flying", "flights") as advance:
-            compared = command.fly(plan, workers, advance, limit_s=limit_s)
+            compared = command.fly(plan, n_workers, advance, limit_s=limit_s)
     result = Comparison(compared, notes)
     if not compared.whole:
         raise Interrupted(result)
     return result
 
 
-def _several(given: Any) -> list[Any]:
-    """One or several of a thing, as a list; a class is one."""
+def _several(what: str, given: Any) -> list[Any]:
+    """One or several of a thing, as a list; a class is one, None is an empty list."""
     if given is None:
         return []
-    return list(given) if isinstance(given, list | tuple | set | frozenset | dict) else [given]
+    several = list(given) if isinstance(given, list | tuple | set | frozenset | dict) else [given]
+    if not several:
+        raise WingslevelError(f"{what} holds none: name at least one, or leave {what} out for all of them")
+    return several
 
 
 def _names(scenarios: Any) -> list[str]:
-    return [os.fspath(name) for name in _several(scenarios)]
+    return [path_of("scenario", name) for name in _several("scenarios", scenarios)]
 
 
-def _limit_s(timeout: float | None) -> float | None:
-    if timeout is not None and not 0.0 < float(timeout) <= 1e6:
-        raise WingslevelError(f"timeout = {timeout!r} s: must be above 0 and at most 1e6, or None")
-    return None if timeout is None else float(plain(timeout))
+def _limit_s(timeout: Any) -> float | None:
+    limit_s = None if timeout is None else number_of("timeout", timeout)
+    if limit_s is not None and not 0.0 < limit_s <= 1e6:
+        raise WingslevelError(f"timeout = {shortly(timeout)} s: must be above 0 and at most 1e6, or None")
+    return limit_s

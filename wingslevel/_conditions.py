@@ -3,17 +3,18 @@
 import inspect
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypedDict, TypeVar, get_type_hints
+from typing import Any, SupportsFloat, SupportsIndex, TypedDict, TypeVar, get_type_hints
 
 from wingslevel._errors import WingslevelError
 
-Number = float | int | str  # NumPy's numbers too
+Number = SupportsFloat | SupportsIndex | str  # Python's numbers, NumPy's, or the text of the command
+Whole = SupportsIndex | str
 Estimator = str | os.PathLike[str] | Callable[..., Any]
 """Registered name, ``module:Class``, ``file.py:Class``, ``library.so``, a class, or a function that makes a new one."""
 
 
 class Conditions(TypedDict, total=False):
-    """What flies, through what air, with which sensors and faults; what is left out is as the scenario has it.
+    """What flies, through what air, with which sensors and faults; what is left out or None is as the scenario has it.
 
     wind : ``"5@270"`` or ``(5, 270)``, speed in m/s and the direction in degrees that it comes from; ``"5@random"``,
         ``"5@cross"``, ``"5@head"``, ``"5@tail"`` (by the heading at the start), ``"calm"``
@@ -30,20 +31,20 @@ class Conditions(TypedDict, total=False):
     settings : any other parameter by its dotted name, ``{"gps.latency_s": 0.5}``; see ``--set`` of the command
     """
 
-    wind: str | tuple[float, float | str]
-    shear: Number
-    gust: str | Sequence[str]
-    turbulence: Number
-    thermals: int | str
-    aircraft: str
-    autopilot: str
-    sensors: str | os.PathLike[str]
-    gps_rate: Number
-    imu_rate: int | str
-    faults: str | Sequence[str]
-    duration: Number
-    withhold: str | Sequence[str]
-    settings: Mapping[str, Any]
+    wind: str | tuple[SupportsFloat | SupportsIndex, Number] | None
+    shear: Number | None
+    gust: str | Sequence[str] | None
+    turbulence: Number | None
+    thermals: Whole | None
+    aircraft: str | None
+    autopilot: str | None
+    sensors: str | os.PathLike[str] | None
+    gps_rate: Number | None
+    imu_rate: Whole | None
+    faults: str | Sequence[str] | None
+    duration: Number | None
+    withhold: str | Sequence[str] | None
+    settings: Mapping[str, Any] | None
 
 
 _FIELDS = {
@@ -56,19 +57,20 @@ _LISTS = ("gust", "faults", "withhold")
 _OWN = {"seed": "seed", "estimator": "estimator"}  # named by an argument, not by a setting
 
 
-def changes_of(conditions: Mapping[str, Any], params: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Changes of the configuration by dotted names.
+def changes_of(
+    function: Callable[..., Any], conditions: Mapping[str, Any], params: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Changes of the configuration by dotted names, of options given to the public `function`.
 
     Raises
     ------
     TypeError           an option that there is not
-    WingslevelError     one that is named twice, or a seed or an estimator among the settings
+    WingslevelError     one of the wrong type or named twice, or a seed or an estimator among the settings
     """
     for name in conditions:
         if name not in (*_FIELDS, "settings"):
-            raise TypeError(f"unknown option {name!r}: {_near(name)}")
-    settings = conditions.get("settings") or {}
-    changes: dict[str, Any] = {str(name): plain(value) for name, value in settings.items()}
+            raise TypeError(f"unknown option {name!r}: {_near(name, function)}")
+    changes = params_of(conditions.get("settings"), "settings")
     for name in _OWN:
         if name in changes:
             raise WingslevelError(f"settings[{name!r}] = {changes[name]!r}: name the {name} as an argument")
@@ -78,14 +80,58 @@ def changes_of(conditions: Mapping[str, Any], params: Mapping[str, Any] | None =
         field = _FIELDS[name]
         if field in changes:
             raise WingslevelError(f"{name} = {value!r} and settings[{field!r}] = {changes[field]!r}: name it once")
-        changes[field] = _wind(value) if name == "wind" else _listed(value) if name in _LISTS else plain(value)
-    return changes | {f"estimator_params.{name}": plain(value) for name, value in (params or {}).items()}
+        changes[field] = _wind(value) if name == "wind" else listed(name, value) if name in _LISTS else plain(value)
+    return changes | {f"estimator_params.{name}": value for name, value in params_of(params).items()}
 
 
-def _near(name: str) -> str:
+def params_of(given: Any, what: str = "params") -> dict[str, Any]:
+    """Values by name, as plain values; empty for None.
+
+    Raises
+    ------
+    WingslevelError     something else than a dict
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise WingslevelError(f"{what} = {shortly(given)}: must be a dict of names and values")
+    return {str(name): plain(value) for name, value in (given or {}).items()}
+
+
+def path_of(what: str, given: Any) -> str:
+    """A name or a path as text.
+
+    Raises
+    ------
+    WingslevelError     something else
+    """
+    if not isinstance(given, str | os.PathLike):
+        raise WingslevelError(f"{what} = {shortly(given)}: must be a name or a path")
+    return str(os.fspath(given))
+
+
+def number_of(what: str, given: Any) -> float:
+    """A number, also one written as text.
+
+    Raises
+    ------
+    WingslevelError     something else
+    """
+    try:
+        return float(plain(given))
+    except (TypeError, ValueError, OverflowError):
+        raise WingslevelError(f"{what} = {shortly(given)}: must be a number") from None
+
+
+def shortly(value: Any) -> str:
+    """`value` in one line of a message."""
+    from sim.outside.blame import shown
+
+    return shown(value)
+
+
+def _near(name: str, function: Callable[..., Any]) -> str:
     from sim.params import near_misses
 
-    return near_misses(name, (*_FIELDS, "settings"))
+    return near_misses(name, tuple(inspect.signature(function).parameters))
 
 
 def _wind(value: Any) -> str:
@@ -103,9 +149,19 @@ def _plainly(number: float) -> str:
     return f"{number:.12f}".rstrip("0").rstrip(".")
 
 
-def _listed(value: Any) -> Any:
-    """One text or several, as the configuration takes them."""
-    return value if isinstance(value, str) else [plain(item) for item in value]
+def listed(what: str, value: Any) -> Any:
+    """One text or several, as the configuration takes them.
+
+    Raises
+    ------
+    WingslevelError     something else
+    """
+    if isinstance(value, str):
+        return value
+    items = list(value) if isinstance(value, Iterable) else [None]
+    if not all(isinstance(item, str) for item in items):
+        raise WingslevelError(f"{what} = {shortly(value)}: must be a text or a list of texts")
+    return [str(item) for item in items]
 
 
 def plain(value: Any) -> Any:
@@ -150,6 +206,10 @@ def seeds_of(seeds: Any) -> list[int]:
     from scenarios.harness.seeds import parse_seeds
 
     if not isinstance(seeds, str):
+        if not isinstance(plain(seeds), int | Iterable):
+            raise WingslevelError(f'seeds = {shortly(seeds)}: must be numbers, or a text as "0-9"')
         numbers = [seeds] if isinstance(plain(seeds), int) else plain(list(seeds))
+        if not numbers:
+            raise WingslevelError("seeds holds none: name at least one")
         seeds = ",".join(str(number) for number in numbers)
     return parse_seeds(seeds)

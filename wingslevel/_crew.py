@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, SupportsIndex
 
 from wingslevel._conditions import Estimator, plain
 from wingslevel._errors import WingslevelError, WingslevelWarning, one_line
@@ -32,7 +32,7 @@ def objects(estimators: Mapping[str, Any]) -> dict[str, Any]:
     return {name: estimator for name, estimator in estimators.items() if not isinstance(estimator, str)}
 
 
-def crew(workers: int | None, estimators: Mapping[str, Any]) -> int:
+def crew(workers: SupportsIndex | None, estimators: Mapping[str, Any]) -> int:
     """How many worker processes; 0 is this process.
 
     workers : as the user says; None is as many as processors, and this process where one cannot be sent to others

@@ -6,9 +6,18 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, SupportsFloat, SupportsIndex, Unpack
 
-from wingslevel._conditions import Conditions, Estimator, changes_of, plain, with_conditions
+from wingslevel._conditions import (
+    Conditions,
+    Estimator,
+    changes_of,
+    number_of,
+    path_of,
+    plain,
+    shortly,
+    with_conditions,
+)
 from wingslevel._crew import quietly
 from wingslevel._errors import Interrupted, WingslevelError, WingslevelWarning, one_line
 from wingslevel._flight import Flight, rows_of
@@ -26,8 +35,8 @@ def fly(
     *,
     estimator: Estimator | None = None,
     params: Mapping[str, Any] | None = None,
-    seed: int | None = None,
-    timeout: float | None = None,
+    seed: SupportsIndex | None = None,
+    timeout: SupportsFloat | None = None,
     progress: Progress = False,
     **conditions: Unpack[Conditions],
 ) -> Flight:
@@ -53,14 +62,16 @@ def fly(
     Interrupted         Ctrl-C; its `result` is the flight up to there
     """
     from scenarios.harness.flight import prepare
+    from scenarios.harness.scenario import Scenario
     from scenarios.harness.verdict import judge
     from sim import recording
     from sim.log import Outcome
 
-    changes = changes_of(conditions, params)
+    changes = changes_of(fly, conditions, params)
+    flown_in = scenario if isinstance(scenario, Scenario) else path_of("scenario", scenario)
     with quietly(), _timed(timeout):
-        prepared = prepare(plain(scenario), changes, seed=plain(seed), estimator=plain(estimator))
-        _warn_of_faults(prepared.config)
+        prepared = prepare(flown_in, changes, seed=plain(seed), estimator=plain(estimator))
+        _warn_of_faults(prepared.scenario.name, prepared.config)
         with progress_of(progress, f"flying {prepared.scenario.name}", "s") as advance:
 
             def watch(log: "Log", n_rows: int) -> None:
@@ -77,26 +88,26 @@ def fly(
 
 
 @contextmanager
-def _timed(timeout: float | None) -> Iterator[None]:
+def _timed(timeout: SupportsFloat | None) -> Iterator[None]:
     """Limit what the block takes."""
     from sim.outside.signals import TimedOut, limited
 
-    if timeout is not None and not 0.0 < float(timeout) < 1e6:
-        raise WingslevelError(f"timeout = {timeout!r} s: must be above 0 and below 1e6, or None")
+    limit_s = None if timeout is None else number_of("timeout", timeout)
+    if limit_s is not None and not 0.0 < limit_s < 1e6:
+        raise WingslevelError(f"timeout = {shortly(timeout)} s: must be above 0 and below 1e6, or None")
     try:
-        with limited(None if timeout is None else float(timeout)):
+        with limited(limit_s):
             yield
     except TimedOut:  # before the first tick, or after the last
         raise WingslevelError(f"timeout = {timeout!r} s: over before the flight began") from None
 
 
-def _warn_of_faults(config: "FlightConfig") -> None:
+def _warn_of_faults(scenario: str, config: "FlightConfig") -> None:
     """Warn of faults for which the flight is too short."""
     from scenarios.harness.config.faults import never_met
 
-    for fault in never_met(config.faults, config.held_s, config.duration_s):
-        lasts = f"the flight lasts from {-config.held_s:g} s to {config.duration_s:g} s after the release"
-        warnings.warn(f"fault {fault} never happens: {lasts}", WingslevelWarning, stacklevel=3)
+    for line in never_met(scenario, config.faults, config.held_s, config.duration_s):
+        warnings.warn(line, WingslevelWarning, stacklevel=3)
 
 
 def load(path: str | os.PathLike[str]) -> Flight:
@@ -112,7 +123,7 @@ def load(path: str | os.PathLike[str]) -> Flight:
     from sim import recording
 
     with one_line():
-        recorded = recording.load(Path(path))
+        recorded = recording.load(Path(path_of("path", path)))
         rows = rows_of(recorded)
         config = recorded.manifest.get("config")
         if rows is None or not config:

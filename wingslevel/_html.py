@@ -69,7 +69,7 @@ def check_rows(rows: "Iterable[Row]") -> list[tuple[str, ...]]:
     return [
         (
             text(f"{row.name} ({row.note})" if row.note else row.name),
-            row.figure if math.isfinite(row.measured) else number(None),
+            row.figure,
             f"{'≤' if row.sense == '<=' else '≥'} {limit_figures(row.limit)}",
             text(row.unit),
             mark(row.passed, ("pass", "FAIL")),

@@ -167,7 +167,7 @@ def _verdict(axis: Any, flight: "Flight") -> None:
     axis.set_title("checks" if flight.judged else "scores")
     if flight.judged:
         lines = [
-            (row.name, f"{row.figure} {row.unit}", f"{row.sense} {limit_figures(row.limit)}", row.passed)
+            (row.name, row.with_unit, f"{row.sense} {limit_figures(row.limit)}", row.passed)
             for row in flight.verdict.rows
         ]
     else:

@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from wingslevel._conditions import shortly
+from wingslevel._errors import WingslevelError
+
 if TYPE_CHECKING:
     from estimator.compiler.compiling import Progress as Kernels
 
@@ -20,6 +23,8 @@ def progress_of(wanted: Progress, what: str, unit: str) -> Iterator[Advance]:
 
     wanted : False shows nothing; True shows a bar after two seconds; a function is called instead
     """
+    if not isinstance(wanted, bool) and not callable(wanted):
+        raise WingslevelError(f"progress = {shortly(wanted)}: must be True, False, or a function of (done, total)")
     if not isinstance(wanted, bool):
         yield wanted
     elif not wanted or not _is_watched():

@@ -3,10 +3,11 @@
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
-from wingslevel._conditions import Estimator, Number, plain
+from wingslevel._conditions import Estimator, Number, listed, number_of, params_of, path_of, plain
 from wingslevel._crew import named, objects, quietly
+from wingslevel._errors import WingslevelError
 from wingslevel._flight import Flight
 from wingslevel._html import number, page, table, text
 from wingslevel._tables import require_pandas
@@ -105,7 +106,7 @@ def replay(
     params: Mapping[str, Any] | None = None,
     reference: str | os.PathLike[str] | None = None,
     columns: str | os.PathLike[str] | None = None,
-    imu: int | None = None,
+    imu: SupportsIndex | None = None,
     withhold: str | Sequence[str] = (),
     calibration: Number | None = None,
     airborne: Number = 5.0,
@@ -138,18 +139,22 @@ def replay(
     from scenarios.harness.commands.replay import replay_log
     from scenarios.harness.replay import Window
 
+    if isinstance(estimators, list | tuple) and not estimators:
+        raise WingslevelError("estimators holds none: name at least one")
+    path, properties = Path(path_of("log", log)), listed("withhold", withhold)
     found = named(estimators if isinstance(estimators, list | tuple) else [estimators])  # type: ignore[list-item]
     with quietly() as notes, lent.lend(objects(found)):
-        window = Window(float(airborne), float(settle), None if calibration is None else float(calibration))
+        calibration_s = None if calibration is None else number_of("calibration", calibration)
+        window = Window(number_of("airborne", airborne), number_of("settle", settle), calibration_s)
         done = replay_log(
-            Path(log),
+            path,
             list(found),
-            None if folder is None else Path(folder),
-            reference=None if reference is None else Path(reference),
-            columns=None if columns is None else os.fspath(columns),
+            None if folder is None else Path(path_of("folder", folder)),
+            reference=None if reference is None else Path(path_of("reference", reference)),
+            columns=None if columns is None else path_of("columns", columns),
             imu=plain(imu),
-            params={str(name): plain(value) for name, value in (params or {}).items()},
-            withheld=withhold.split(",") if isinstance(withhold, str) else list(withhold),
+            params=params_of(params),
+            withheld=properties.split(",") if isinstance(properties, str) else properties,
             window=window,
             rerun=rerun,
         )

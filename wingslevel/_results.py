@@ -1,6 +1,7 @@
 """What `check` and `compare` return."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from wingslevel._html import CHECK_HEADINGS, check_rows, mark, number, page, table, text
@@ -112,8 +113,20 @@ class Comparison:
 
     @property
     def estimators(self) -> Mapping[str, Mapping[str, Any]]:
-        """Numbers of each estimator by its name: errors, flights survived, checks passed, cost of an update."""
-        return {entrant.name: entrant.to_json() for entrant in self._compared.entrants}
+        """Numbers of each estimator by its name: errors, flights survived, checks passed, cost of an update.
+
+        A class or ``file.py:Class`` has the name of the class, as in `Replay`; two of one name have their full names.
+        """
+        numbers = (entrant.to_json() for entrant in self._compared.entrants)
+        return dict(zip(self._names, numbers, strict=True))
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        from scenarios.harness.plugins import short_name
+
+        names = [entrant.name for entrant in self._compared.entrants]
+        short = [short_name(name) for name in names]
+        return tuple(one if short.count(one) == 1 else name for name, one in zip(names, short, strict=True))
 
     @property
     def flights(self) -> "tuple[FlightVerdict, ...]":
@@ -139,8 +152,8 @@ class Comparison:
         import pandas as pd
 
         lines = [
-            {name: value for name, value in numbers.items() if name not in ("given", "known")}
-            for numbers in self.estimators.values()
+            {key: value for key, value in numbers.items() if key not in ("given", "known")} | {"estimator": name}
+            for name, numbers in self.estimators.items()
         ]
         return pd.DataFrame(lines)
 
@@ -158,8 +171,7 @@ class Comparison:
 
     def __repr__(self) -> str:
         n = len(self.seeds)
-        names = ", ".join(entrant.name for entrant in self._compared.entrants)
-        return f"<Comparison {self.scenario}, {n} {'seed' if n == 1 else 'seeds'}: {names}>"
+        return f"<Comparison {self.scenario}, {n} {'seed' if n == 1 else 'seeds'}: {', '.join(self._names)}>"
 
     def _repr_html_(self) -> str:
         headings = (
@@ -167,12 +179,12 @@ class Comparison:
             "ns per<br>update", "checks<br>passed",
         )  # fmt: skip
         rows = []
-        for e in self._compared.entrants:
+        for name, e in zip(self._names, self._compared.entrants, strict=True):
             cost = "" if e.cost is None else f"{e.cost.ns:.0f}"
             checks = f"{e.checks_passed}/{len(e.pooled.rows)}" if e.pooled else ""
             numbers = [number(value) for value in e.numbers.values()]
             survived = f"{e.survived}/{len(e.flights)}"
-            rows.append((text(e.name), survived, *numbers, text(e.heading_reference), cost, checks))
+            rows.append((text(name), survived, *numbers, text(e.heading_reference), cost, checks))
         n = len(self.seeds)
         title = f"<b>{text(self.scenario)}</b> &middot; {n} {'seed' if n == 1 else 'seeds'}"
         below = "<br>".join(text(note) for note in self.notes)
@@ -199,4 +211,4 @@ def _why(v: "FlightVerdict") -> str:
     """Why a flight failed."""
     if v.message or v.broken:
         return v.ending
-    return ", ".join(f"{row.name} {row.figure} {row.unit}".rstrip() for row in v.rows if not row.passed)
+    return ", ".join(f"{row.name} {row.with_unit}" for row in v.rows if not row.passed)

@@ -286,7 +286,7 @@ def _rms(flights: Sequence[tuple[bool, Mapping[str, Any]]], number: str) -> str:
     """Root of the mean square over flights, and the worst."""
     values = [float(properties[number]) for _, properties in flights if number in properties]
     if not values:
-        return "none"
+        return "not measured"
     pooled = math.sqrt(sum(value**2 for value in values) / len(values))
     return f"{pooled:.2f} deg" + (f" (worst {max(values):.2f})" if len(values) > 1 else "")
 

@@ -52,8 +52,10 @@ def why_unsendable(maker: Any) -> str:
     try:
         found.dump(maker)
     except Exception as problem:  # anyone's objects
-        local = isinstance(maker, FunctionType | type) and "<" in maker.__qualname__
-        return "it is defined inside a function" if local else f"it cannot be pickled ({type(problem).__name__})"
+        name = maker.__qualname__ if isinstance(maker, FunctionType | type) else ""
+        if name.endswith("<lambda>"):
+            return "it is a lambda"
+        return "it is defined inside a function" if "<" in name else f"it cannot be pickled ({type(problem).__name__})"
     for name in sorted(found.modules):
         if name == "__main__":
             return "it is defined in the script or notebook itself"

@@ -18,16 +18,25 @@ class Mine:
 
 
 estimator: wl.AttitudeEstimator = Mine()
+wind: str | None = None
+duration: float | None = 5
+numbers = wl.fly(
+    "crosswind", seed=np.int64(3), duration=np.float32(2), wind=(np.float64(5), np.int64(270)), gps_rate=np.int32(5),
+    imu_rate=np.int64(50), timeout=np.float64(60),
+)  # fmt: skip
+assert_type(wl.fly("crosswind", wind=wind, duration=duration, settings=None, faults=None), wl.Flight)
 flight = wl.fly("crosswind", estimator=Mine, params={"k": 2.0}, seed=3, wind="5@270", gps_rate=5, duration=5)
 assert_type(flight, wl.Flight)
 assert_type(flight.passed, bool)
 assert_type(flight.metrics["inclination_rms_deg"], float | None)
 assert_type([row.measured for row in flight.verdict.rows], list[float])
 assert_type(flight.events[0].t_s, float)
-checked = wl.check("crosswind", seeds=range(1), estimator=Mine, workers=1, duration=2, faults=["gps:outage@1"])
+checked = wl.check(
+    "crosswind", seeds=range(1), estimator=Mine, workers=np.int64(1), duration=2, faults=["gps:outage@1"]
+)
 assert_type(checked, wl.CheckResult)
 assert_type(checked.flights[0].seed, int)
-compared = wl.compare("crosswind", ["premerlani", Mine], seeds="0", duration=2)
+compared = wl.compare("crosswind", ["premerlani", Mine], seeds=[np.int64(0)], duration=2)
 assert_type(compared, wl.Comparison)
 n = 200
 found = wl.estimate(

@@ -139,6 +139,16 @@ def test_fly_sets_parameters() -> None:
         ({"faults": "gyro.x:stick@3"}, "stuck"),
         ({"aircraft": "albatros"}, "unknown aircraft"),
         ({"timeout": 0}, "timeout"),
+        ({"timeout": "soon"}, "timeout = 'soon': must be a number"),
+        ({"scenario": None}, "scenario = None: must be a name or a path"),
+        ({"scenario": 3}, "scenario = 3: must be a name or a path"),
+        ({"params": [1]}, "params = .*must be a dict"),
+        ({"params": "kp=1"}, "params = 'kp=1': must be a dict"),
+        ({"settings": [1]}, "settings = .*must be a dict"),
+        ({"faults": 3}, "faults = 3: must be a text or a list of texts"),
+        ({"gust": 4}, "gust = 4: must be a text or a list of texts"),
+        ({"gust": [4]}, "gust = .*must be a text or a list of texts"),
+        ({"progress": 3}, "progress = 3: must be True, False, or a function"),
     ],
 )
 def test_fly_refuses_in_one_line(arguments: dict[str, Any], message: str) -> None:
@@ -153,12 +163,16 @@ def test_fly_refuses_an_option_that_there_is_not() -> None:
     """As Python does, with the near misses."""
     with pytest.raises(TypeError, match="gust"):
         wl.fly("crosswind", gusts="4@2")  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="unknown option 'estimtor': did you mean estimator"):
+        wl.fly("crosswind", estimtor="premerlani")  # type: ignore[call-arg]
 
 
 def test_fly_warns_of_a_fault_after_the_end() -> None:
     """It is allowed, and hardly meant."""
-    with pytest.warns(wl.WingslevelWarning, match=r"gps:outage@30.* never happens"):
+    with pytest.warns(wl.WingslevelWarning, match=r"gps:outage@30.* never happens") as warned:
         wl.fly("crosswind", duration=1, faults="gps:outage@30")
+    lasts = "the flight of 'crosswind' lasts from 0 s to 1 s after the release"
+    assert [str(one.message) for one in warned] == [f"fault gps:outage@30 never happens: {lasts}"]
 
 
 def test_flight_of_an_estimator_that_raises_is_a_result() -> None:
@@ -263,8 +277,26 @@ def test_progress_is_told_to_a_function() -> None:
     assert told == [(pytest.approx(k), pytest.approx(3.0)) for k in (1, 2, 3)]
 
 
+def test_a_check_that_was_not_measured_says_so_everywhere(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Checks begin at 20 s: a flight of 2 s measures none of those."""
+    flown = wl.fly("crosswind", duration=2)
+    missing = [row for row in flown.verdict.rows if not math.isfinite(row.measured)]
+    assert missing
+    html = flown._repr_html_()
+    assert html.count(">not measured<") == len(missing)
+    drawn = [text.get_text() for axis in flown.plot().axes for text in axis.texts]
+    assert drawn.count("not measured") == len(missing)
+    run(["fly", "crosswind", "--duration", "2", "--no-rerun", "--out", str(tmp_path)])
+    assert capsys.readouterr().out.count("not measured") == len(missing)
+    markdown = wl.check("crosswind", seeds=0, duration=2, workers=1).to_markdown()
+    assert "not measured" in markdown
+    assert "none" not in markdown
+
+
 def test_load_refuses_in_one_line(tmp_path: Path) -> None:
     """No recording there, or something else."""
+    with pytest.raises(wl.WingslevelError, match="path = None: must be a name or a path"):
+        wl.load(None)  # type: ignore[arg-type]
     with pytest.raises(wl.WingslevelError, match=r"flight\.parquet"):
         wl.load(tmp_path)
     (tmp_path / "flight.parquet").write_bytes(b"no")

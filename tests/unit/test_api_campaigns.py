@@ -78,13 +78,45 @@ def local() -> type:
     return Local
 
 
-@pytest.mark.parametrize("estimator", [local(), lambda: Level(2.0), partial(local(), k=3.0)])
-def test_check_flies_here_what_cannot_be_sent(estimator: Any) -> None:
+@pytest.mark.parametrize(
+    ("estimator", "why"),
+    [
+        (local(), "because it is defined inside a function"),
+        (lambda: Level(2.0), "because it is a lambda"),
+        (partial(local(), k=3.0), "because it cannot be pickled"),
+    ],
+)
+def test_check_flies_here_what_cannot_be_sent(estimator: Any, why: str) -> None:
     """Without `workers` they fly in this process, with several they are refused."""
     result = wl.check("crosswind", estimator=estimator, **SHORT)
     assert [flight.outcome for flight in result.flights] == ["completed"] * 2
-    with pytest.raises(wl.WingslevelError, match=r"cannot be sent to other processes.*file\.py:Class") as refused:
+    with pytest.raises(wl.WingslevelError, match=rf"cannot be sent .* {why}.*file\.py:Class") as refused:
         wl.check("crosswind", estimator=estimator, workers=2, **SHORT)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: wl.compare("crosswind", []), "estimators holds none: name at least one"),
+        (lambda: wl.compare("crosswind", seeds=[]), "seeds holds none: name at least one"),
+        (lambda: wl.check([]), "scenarios holds none: name at least one"),
+        (lambda: wl.check("crosswind", seeds=[]), "seeds holds none: name at least one"),
+        (lambda: wl.check("crosswind", seeds=3.5), "seeds = 3.5: must be numbers"),  # type: ignore[arg-type]
+        (lambda: wl.check(3), "scenario = 3: must be a name or a path"),  # type: ignore[arg-type]
+        (lambda: wl.check("crosswind", progress=3), "progress = 3: must be True"),  # type: ignore[arg-type]
+        (lambda: wl.check("crosswind", params=[1]), "params = .*must be a dict"),  # type: ignore[arg-type]
+        (lambda: wl.compare(None), "scenario = None: must be a name or a path"),  # type: ignore[arg-type]
+        (lambda: wl.replay("log.csv", []), "estimators holds none: name at least one"),
+        (lambda: wl.replay(None), "log = None: must be a name or a path"),  # type: ignore[arg-type]
+        (lambda: wl.replay("log.csv", withhold=3), "withhold = 3: must be a text"),  # type: ignore[arg-type]
+        (lambda: wl.replay("log.csv", settle="soon"), "settle = 'soon': must be a number"),
+    ],
+)
+def test_nothing_and_wrong_types_are_refused_in_one_line(call: Any, message: str) -> None:
+    """An empty list is a mistake, not a short form for all."""
+    with pytest.raises(wl.WingslevelError, match=message) as refused:
+        call()
     assert "\n" not in str(refused.value)
 
 

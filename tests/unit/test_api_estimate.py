@@ -25,7 +25,7 @@ def still(roll_deg: float, pitch_deg: float) -> tuple[Any, Any, Any]:
 @pytest.mark.parametrize("estimator", ["premerlani", "ap_dcm", "starlino"])
 def test_estimate_of_something_still_is_its_tilt(estimator: str) -> None:
     """Roll and pitch are those of the specific force, in every row, those of the calibration too."""
-    found = wl.estimate(*still(20.0, -10.0), estimator=estimator)
+    found = wl.estimate(*still(20.0, -10.0), estimator=estimator, calibration_s=2.0)
     assert len(found) == RATE_HZ * SECONDS
     assert found.first == 2 * RATE_HZ
     np.testing.assert_allclose(found.euler_deg[:, :2], np.tile([20.0, -10.0], (len(found), 1)), rtol=0, atol=0.05)
@@ -45,6 +45,7 @@ def test_estimate_of_a_flight_is_its_replay(tmp_path: Any) -> None:
         m["t_s"], m["gyro_b_rad_s"], m["force_b_m_s2"],
         gps={"t_s": fixes["t_s"], "v_e_m_s": fixes["gps_v_e_m_s"], "p_e_m": fixes["gps_p_e_m"]},
         params={name: entry.value for name, entry in expected.known.items() if entry.source != "assumed"},
+        calibration_s=2.0,
     )  # fmt: skip
     first = found.first
     assert first == expected.first
@@ -54,6 +55,66 @@ def test_estimate_of_a_flight_is_its_replay(tmp_path: Any) -> None:
     true_deg = Rotation.from_matrix(flight.truth["R_eb"]).as_euler("ZYX", degrees=True)[:, [2, 1]]
     airborne = flight.t_s > flight.release_s + 3.0
     assert np.abs(found.euler_deg[airborne, :2] - true_deg[airborne]).max() < 10.0
+
+
+def turning(seconds: float, yaw_deg_s: float, rate_hz: int = RATE_HZ) -> tuple[Any, Any, Any]:
+    """Times, rates and specific forces of something level that turns at a constant rate."""
+    n = round(seconds * rate_hz)
+    gyro = np.tile([0.0, 0.0, np.radians(yaw_deg_s)], (n, 1))
+    return np.arange(1, n + 1) / rate_hz, gyro, np.tile([0.0, 0.0, -9.8], (n, 1))
+
+
+def test_estimate_of_a_constant_rate_is_its_integral() -> None:
+    """20 deg/s of yaw for 30 s are 600 deg: no offset is taken from the start of a turn."""
+    found = wl.estimate(*turning(30.0, 20.0), estimator="gyro_only")
+    assert found.euler_deg[-1, 2] == pytest.approx(600.0 - 360.0, abs=0.01)
+    np.testing.assert_array_equal(found.gyro_bias_b_rad_s, 0.0)
+    assert (found.first, found.calibration_b_rad_s) == (0, None)
+    assert repr(found) == "<Attitudes of gyro_only, 1500 samples, 30.0 s>"
+
+
+def test_estimate_of_a_coordinated_turn_without_gps_keeps_its_heading() -> None:
+    """Banked by 30 deg at 15 m/s: the body rates turn the heading at g tan(30 deg) / 15 m/s.
+
+    The estimator starts level to the north and its axis of rotation is constant.  Its integration is of first order:
+    0.6 deg after 433 deg at 50 Hz, a tenth of that at 500 Hz.
+    """
+    n, bank = 20 * 500, np.radians(30.0)
+    rate_rad_s = G_M_S2 * np.tan(bank) / 15.0
+    gyro = np.tile(rate_rad_s * np.array([0.0, np.sin(bank), np.cos(bank)]), (n, 1))
+    force = np.tile([0.0, 0.0, -G_M_S2 / np.cos(bank)], (n, 1))
+    found = wl.estimate(1.0 / 500, gyro, force, estimator="gyro_only")
+    exact = Rotation.from_rotvec(20.0 * gyro[0])
+    assert np.degrees((exact.inv() * Rotation.from_matrix(found.R_eb[-1])).magnitude()) < 0.1
+
+
+def test_estimate_says_which_offset_a_calibration_took() -> None:
+    """Asked for, it takes the constant rate as an offset, and says so."""
+    found = wl.estimate(*turning(30.0, 20.0), estimator="gyro_only", calibration_s=2)
+    assert found.calibration_b_rad_s == pytest.approx([0.0, 0.0, np.radians(20.0)])
+    assert "calibrated over 100 samples: gyro offset (0, 0, 20) deg/s" in repr(found)
+
+
+def test_estimate_takes_two_seconds_of_samples() -> None:
+    """As long as the calibration of a replay."""
+    assert len(wl.estimate(*turning(2.0, 1.0))) == 100
+
+
+@pytest.mark.parametrize("interval_s", [10.0, 1e-6])
+def test_estimate_warns_of_an_implausible_interval(interval_s: float) -> None:
+    """Milliseconds, or something else."""
+    _, gyro, force = still(0.0, 0.0)
+    with pytest.warns(wl.WingslevelWarning, match=r"t_s has a median interval of .* must be in seconds"):
+        wl.estimate(interval_s * np.arange(1, len(gyro) + 1), gyro, force)
+
+
+@pytest.mark.parametrize("factor", [0.01, 10.0, 1000.0])
+@pytest.mark.parametrize("estimator", ["premerlani", "gyro_only"])
+def test_estimate_warns_of_a_magnetometer_in_other_units(factor: float, estimator: str) -> None:
+    """Gauss, milligauss and nanotesla, also if the estimator has no use for it."""
+    mag: Any = {"t_s": [1.0, 2.0], "field_b_ut": np.array([[20.0, 0.0, 40.0]] * 2) * factor}
+    with pytest.warns(wl.WingslevelWarning, match=r"mag\['field_b_ut'\] has a median size of .* uT"):
+        wl.estimate(*still(0.0, 0.0), estimator=estimator, mag=mag)
 
 
 def test_estimate_takes_an_interval_and_lists() -> None:
@@ -92,12 +153,13 @@ def test_estimate_takes_your_own_class() -> None:
 
 def test_estimate_as_a_table() -> None:
     """A row for each sample, with angles and the name of the health; a line and a table about it."""
-    found = wl.estimate(*still(20.0, -10.0))
+    found = wl.estimate(*still(20.0, -10.0), calibration_s=2.0)
     frame = found.to_pandas()
     assert len(frame) == len(found)
     assert frame["roll_deg"].iloc[-1] == pytest.approx(20.0, abs=0.05)
     assert set(frame["health_name"]) <= {"starting", "good", "poor"}
-    assert repr(found) == "<Attitudes of premerlani, 1000 samples, 20.0 s>"
+    calibrated = "calibrated over 100 samples: gyro offset (0, 0, 0) deg/s"
+    assert repr(found) == f"<Attitudes of premerlani, 1000 samples, 20.0 s, {calibrated}>"
     assert "roll at the end" in found._repr_html_()
 
 
@@ -121,6 +183,9 @@ def test_estimate_as_a_table() -> None:
         ({"estimator": "oracle"}, "oracle"),
         ({"params": {"kp": 1.0}}, "k_p"),
         ({"calibration_s": 1e4}, "calibration_s"),
+        ({"calibration_s": None}, "calibration_s = None: must be a number"),
+        ({"params": [1]}, "params = .*must be a dict"),
+        ({"gps": {"t_s": [31.0], "v_e_m_s": [[0, 0, 0]]}}, r"no sample between 0 s and 20 s"),
     ],
 )
 def test_estimate_refuses_in_one_line(changes: dict[str, Any], message: str) -> None:

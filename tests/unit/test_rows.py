@@ -13,7 +13,7 @@ from sim.rows import Row, figures, limit_figures, markdown_cells, markdown_table
 @pytest.mark.parametrize(
     ("value", "text"),
     [(0.02193, "0.0219"), (9.996, "10.0"), (772.4, "772"), (-1.0, "-1.00"), (0.0, "0"), (5.8e-7, "5.8e-07"),
-     (123456.0, "1.2e+05"), (math.nan, "none"), (math.inf, "none")],
+     (123456.0, "1.2e+05"), (math.nan, "not measured"), (math.inf, "not measured")],
 )  # fmt: skip
 def test_figures_have_three_digits(value, text):
     """Angles, heights and parts in a million alike."""

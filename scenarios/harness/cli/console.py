@@ -194,11 +194,8 @@ def warn_of_faults(scenario: str, config: "FlightConfig") -> None:
     """Warn of faults that begin after the end of the flight, each on a line of standard error."""
     from scenarios.harness.config.faults import never_met
 
-    for fault in never_met(config.faults, config.held_s, config.duration_s):
-        error(
-            f"warning: fault {fault} never happens: {scenario} lasts from {-config.held_s:g} s to "
-            f"{config.duration_s:g} s after the release"
-        )
+    for line in never_met(scenario, config.faults, config.held_s, config.duration_s):
+        error(f"warning: {line}")
 
 
 def number(value: float) -> str:

@@ -106,7 +106,7 @@ def print_report(verdict: Verdict) -> None:
         out.print(console.verdict_table(f"{pool.scenario}, {pool.estimator}, {pool.n_flights} flights", pool.rows))
     for flight in verdict.flights:
         if not flight.passed:
-            failed = ", ".join(f"{row.name} {row.figure} {row.unit}".rstrip() for row in flight.rows if not row.passed)
+            failed = ", ".join(f"{row.name} {row.with_unit}" for row in flight.rows if not row.passed)
             why = flight.ending if flight.message or flight.broken else failed
             console.line(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red")
     flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))

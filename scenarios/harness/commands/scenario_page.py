@@ -16,7 +16,7 @@ from scenarios.harness.commands import agree
 from scenarios.harness.registry import registered
 from scenarios.harness.scenario import Scenario
 from sim.outside.wording import markdown
-from sim.rows import NOT_MEASURED, limit_figures
+from sim.rows import limit_figures
 
 TIGHTEST = 10  # checks in the table of the smallest margins
 
@@ -119,12 +119,8 @@ def _cells(check: Check, rows: Sequence[Row], pooled: Sequence[Row], n_flights: 
     missing = [row for row in rows if not math.isfinite(row.measured)]
     sign = 1.0 if check.sense == "<=" else -1.0
     worst = missing[0] if missing else max(rows, key=lambda row: sign * row.measured)
-    of_all = [text for row in pooled if check.pooled == "rms" for text in (_figure(row), _margin(row))]
-    return Cells(_figure(worst), _margin(worst), *of_all[:2])
-
-
-def _figure(row: Row) -> str:
-    return row.figure if math.isfinite(row.measured) else NOT_MEASURED
+    of_all = [text for row in pooled if check.pooled == "rms" for text in (row.figure, _margin(row))]
+    return Cells(worst.figure, _margin(worst), *of_all[:2])
 
 
 def _margin(row: Row) -> str:

@@ -59,9 +59,11 @@ def typed_faults(faults: Any) -> Any:
     return tuple(texts)
 
 
-def never_met(faults: Sequence[str], held_s: float, duration_s: float) -> list[str]:
-    """Those of `faults` that lie wholly outside a flight of `duration_s` after `held_s` in the hand."""
-    return [text for text in faults if not _is_met(parse_fault(text), held_s, duration_s)]
+def never_met(scenario: str, faults: Sequence[str], held_s: float, duration_s: float) -> list[str]:
+    """A line for each of `faults` that lies wholly outside the flight: `duration_s` after `held_s` in the hand."""
+    lasts = f"the flight of {scenario!r} lasts from {0.0 - held_s:g} s to {duration_s:g} s after the release"
+    missed = (text for text in faults if not _is_met(parse_fault(text), held_s, duration_s))
+    return [f"fault {text} never happens: {lasts}" for text in missed]
 
 
 def _is_met(fault: Fault, held_s: float, duration_s: float) -> bool:
