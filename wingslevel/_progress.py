@@ -61,7 +61,7 @@ class _Bar:
     def compiling(self, kernels: "Kernels") -> None:
         """Count the kernels that are compiled, which takes up to half a minute the first time."""
         if self._is_shown():
-            self._bar.update(self._task, what=f"compiling, once for this version: {kernels.compiled} kernels")
+            self._bar.update(self._task, what=f"compiling: {kernels.compiled} kernels")
 
     def _is_shown(self) -> bool:
         if self._bar is None and time.monotonic() - self._began_s >= PATIENCE_S:

@@ -6,6 +6,7 @@ kernels are cached with the name of their module.  Kernels of a file with a name
 separate folder, so that any process can load them.
 """
 
+import ast
 import hashlib
 import importlib
 import importlib.util
@@ -19,6 +20,8 @@ from typing import NamedTuple
 from sim.outside.blame import Refused, theirs
 
 PREFIX = "wingslevel"
+_PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
+_HOME = Path(__file__).resolve().parents[2]
 LIBRARIES = (".so", ".dylib", ".dll")
 _run: dict[str, ModuleType] = {}  # modules that were made here, by name
 _running: set[Path] = set()  # files whose code is being run
@@ -60,11 +63,34 @@ def module_of_file(path: Path, refuse: Callable[[str], Exception]) -> ModuleType
         raise refuse(f"no file {str(path)!r}")
     path = path.resolve()
     also_import_from(path.parent)
+    hidden = next(_modules_hidden_by_ours(path), None)
+    if hidden is not None:
+        raise refuse(f"{path.name} imports {hidden.stem!r}, a package of wingslevel: rename your own {hidden}")
     with theirs(refuse, str(path)):
         imported = sys.modules.get(path.stem)
         if imported is not None and imported is not _run.get(path.stem) and _is_in(imported, path):
             return imported  # by an import statement
         return _executed(path)
+
+
+def _modules_hidden_by_ours(path: Path) -> Iterator[Path]:
+    """Modules beside the file at `path` that it imports, but that a package of wingslevel of the same name hides."""
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError):
+        return  # reported when it is run
+    for node in ast.walk(tree):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module in _PACKAGES:
+            package = importlib.import_module(node.module)
+            is_ours = (
+                hasattr(package, a.name) or importlib.util.find_spec(f"{node.module}.{a.name}") for a in node.names
+            )
+            names = [] if all(is_ours) else [node.module]
+        for name in names:
+            for beside in (path.parent / f"{name}.py", path.parent / name):
+                if name in _PACKAGES and beside.exists() and beside not in (path, _HOME / name):
+                    yield beside
 
 
 def also_import_from(folder: Path) -> None:

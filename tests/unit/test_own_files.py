@@ -245,3 +245,27 @@ def test_script_that_raises_for_one_seed_fails_that_flight_and_loses_no_other(he
     assert flights[1]["message"] == "scenario mine: script: SystemExit: 0 (mine.py, line 18, in script)"
     assert not flights[1]["passed"]
     assert flights[1]["message"] in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("line", "is_refused"),
+    [
+        ("import sim", True),
+        ("from sim import SCALE", True),
+        ("import sim.loop", False),
+        ("from sim import loop", False),
+    ],
+)
+def test_own_module_that_a_package_of_ours_hides_is_named(here: Path, line: str, is_refused: bool) -> None:
+    """Not silently our package in place of the user's sim.py; an import that only ours can give is left alone."""
+    Path("sim.py").write_text("SCALE = 2.0\n", encoding="utf-8")
+    Path("own.py").write_text(
+        f"{line}\n\nclass Mine:\n    def update(self, m):\n        return None\n", encoding="utf-8"
+    )
+    if is_refused:
+        with pytest.raises(
+            ValueError, match=r"own\.py imports 'sim', a package of wingslevel: rename your own .*sim\.py"
+        ):
+            load_estimator("own.py:Mine")
+    else:
+        load_estimator("own.py:Mine")

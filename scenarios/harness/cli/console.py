@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 USAGE, INTERRUPTED = 2, 130  # exit codes, beside those of a verdict
 WIDTH = 80
-COMPILING = "compiling the kernels, once for this version: about half a minute"
+COMPILING = "compiling kernels that are not cached yet: up to half a minute"
 _bars: list["Progress"] = []  # on the screen now: what is written while one is there goes through its console
 _LONGEST = 2000  # characters of a line on standard error
 
