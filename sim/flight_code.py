@@ -116,7 +116,7 @@ def record_estimate(flown: NDArray[Any], k: int, e: AttitudeEstimate) -> Attitud
     Returns `e`, converted to float arrays if it was given as lists or the like.
     """
     if type(e) is not AttitudeEstimate:
-        raise Unusable(f"update() returned {class_name(e)}, must return an AttitudeEstimate")
+        raise Unusable(f"update() returned {class_name(e)}; it must return an AttitudeEstimate")
     try:
         R_eb, omega, bias, wind, health = e
         if wind is None:
@@ -156,13 +156,13 @@ def record_estimates(flown: NDArray[Any], estimates: object) -> tuple[int, str]:
     Unusable      `estimates` is not a structured array of that many rows
     """
     n = len(flown)
-    right = f"must return a structured array of {n} rows with {', '.join(_COLUMNS)}"
+    right = f"it must return a structured array of {n} rows with {', '.join(_COLUMNS)}"
     if not isinstance(estimates, np.ndarray) or estimates.dtype.names is None:
-        raise Unusable(f"replay() returned {class_name(estimates)}, {right}")
+        raise Unusable(f"replay() returned {class_name(estimates)}; {right}")
     missing = [name for name in _COLUMNS if name not in estimates.dtype.names]
     if missing or estimates.shape != (n,):
         what = f"without {', '.join(missing)}" if missing else f"of shape {estimates.shape}"
-        raise Unusable(f"replay() returned an array {what}, {right}")
+        raise Unusable(f"replay() returned an array {what}; {right}")
     columns = [_numbers(name, estimates[name], (n, *shape)) for name, shape in _COLUMNS.items()]
     if not np.array_equal(columns[4], np.rint(columns[4])):
         raise Unusable(_FAULTS[6])
@@ -173,7 +173,7 @@ def record_estimates(flown: NDArray[Any], estimates: object) -> tuple[int, str]:
 def _plain_estimate(e: AttitudeEstimate) -> AttitudeEstimate:
     """`e` in new float arrays; Unusable for other types or shapes."""
     if len(e) != len(AttitudeEstimate._fields):
-        raise Unusable(f"the AttitudeEstimate has {len(e)} fields, must have {len(AttitudeEstimate._fields)}")
+        raise Unusable(f"the AttitudeEstimate has {len(e)} fields; it must have {len(AttitudeEstimate._fields)}")
     R_eb, omega, bias = (_numbers(name, e[i], _VECTORS[i]) for i, name in enumerate(AttitudeEstimate._fields[:3]))
     wind = None if e.wind_e_m_s is None else _numbers("wind_e_m_s", e.wind_e_m_s, (3,))
     try:
@@ -187,9 +187,9 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Array:
     """`value` as a new float array of that shape; Unusable if it is not one."""
     array = np.asarray(value)
     if array.shape != shape:
-        raise Unusable(f"{name} has shape {array.shape}, must have shape {shape}")
+        raise Unusable(f"{name} has shape {array.shape}; it must have shape {shape}")
     if array.dtype.kind not in "fiu":
-        raise Unusable(f"{name} is made of {array.dtype}, must be made of numbers")
+        raise Unusable(f"{name} is made of {array.dtype}; it must be made of numbers")
     if np.ma.isMaskedArray(value) and np.ma.getmaskarray(value).any():
         raise Unusable(f"{name} has masked elements")
     with np.errstate(over="ignore"):  # too large a number becomes infinite and is rejected
@@ -202,7 +202,7 @@ def record_command(flown: NDArray[Any], k: int, command: ActuatorCommand) -> Act
     Returns `command`, converted to floats if it was given as another type.
     """
     if type(command) is not ActuatorCommand:
-        raise Unusable(f"update() returned {class_name(command)}, must return an ActuatorCommand")
+        raise Unusable(f"update() returned {class_name(command)}; it must return an ActuatorCommand")
     try:
         if not _record_command(flown, k, *command):
             return command
@@ -219,7 +219,7 @@ def _plain_command(command: ActuatorCommand) -> ActuatorCommand:
     """`command` in floats and an int; Unusable for other types."""
     names = ActuatorCommand._fields
     if len(command) != len(names):
-        raise Unusable(f"the ActuatorCommand has {len(command)} fields, must have {len(names)}")
+        raise Unusable(f"the ActuatorCommand has {len(command)} fields; it must have {len(names)}")
     plain: dict[str, Any] = {}
     value: Any
     for name, value in zip(names, command, strict=True):
@@ -229,12 +229,12 @@ def _plain_command(command: ActuatorCommand) -> ActuatorCommand:
             except (TypeError, ValueError):
                 raise Unusable(_COMMAND_FAULTS[2].format(shown(value))) from None
         elif not issubclass(type(value), int | float | np.integer | np.floating):
-            raise Unusable(f"{name} is {shown(value)}, must be a number")
+            raise Unusable(f"{name} is {shown(value)}; it must be a number")
         else:
             try:
                 plain[name] = float(value)
             except OverflowError:
-                raise Unusable(f"{name} is {shown(value)}, must be within -1..1") from None
+                raise Unusable(f"{name} is {shown(value)}; it must be within -1..1") from None
     return ActuatorCommand(**plain)
 
 
@@ -246,7 +246,7 @@ def reference_of(estimator: object) -> HeadingReference:
             return "course"
         if str.__eq__(reference, "nose"):
             return "nose"
-    raise Unusable(f"heading_reference is {shown(reference)}, must be 'course' or 'nose'")
+    raise Unusable(f"heading_reference is {shown(reference)}; it must be 'course' or 'nose'")
 
 
 def blaming(outcome: Outcome, who: object, t_s: float) -> theirs:

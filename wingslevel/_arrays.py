@@ -141,12 +141,14 @@ def _array(name: str, given: Any, width: int, *, holes: bool = False) -> Array:
     try:
         values = np.array(given, dtype=np.float64)
     except (TypeError, ValueError):
-        raise WingslevelError(f"{name} is no array of numbers: must have shape {right}") from None
+        raise WingslevelError(f"{name} is not an array of numbers; it must have shape {right}") from None
     if values.ndim != (2 if width else 1) or (width and values.shape[1] != width):
-        raise WingslevelError(f"{name} has shape {values.shape}, must be {right}")
+        raise WingslevelError(f"{name} has shape {values.shape}; it must be {right}")
     bad = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
     if len(bad) and not holes:
-        raise WingslevelError(f"{name}[{int(bad[0])}] = {values[bad[0]].tolist()}: leave out rows that hold no number")
+        raise WingslevelError(
+            f"{name}[{int(bad[0])}] = {values[bad[0]].tolist()}: remove rows that contain NaN or infinity"
+        )
     return values
 
 
@@ -167,7 +169,7 @@ def _warn_of_units(gyro: Array, force: Array) -> None:
 def _arrivals(name: str, given: Mapping[str, Any], fields: Mapping[str, int], rows: Any) -> dict[str, Any]:
     """Arrays of an instrument by field, with the row of each sample under "at" ("new" where rows have one)."""
     if not isinstance(given, Mapping):
-        raise WingslevelError(f"{name} is {type(given).__name__}, must be a dict with {', '.join(('t_s', *fields))}")
+        raise WingslevelError(f"{name} is {type(given).__name__}; it must be a dict with {', '.join(('t_s', *fields))}")
     odd = [key for key in given if key not in ("t_s", *fields)]
     if odd or "t_s" not in given:
         wrong = f"holds {odd[0]!r}" if odd else "holds no 't_s'"

@@ -28,7 +28,7 @@ def _same(one: Any, other: Any) -> bool:
 
 
 def objects(estimators: Mapping[str, Any]) -> dict[str, Any]:
-    """Those that are no names."""
+    """Those that are not names."""
     return {name: estimator for name, estimator in estimators.items() if not isinstance(estimator, str)}
 
 
@@ -56,7 +56,7 @@ def crew(workers: int | None, estimators: Mapping[str, Any]) -> int:
             return 0
         if why:
             raise WingslevelError(
-                f"workers = {number}: estimator {name!r} cannot be sent to other processes, for {why}; move it to a "
+                f"workers = {number}: estimator {name!r} cannot be sent to other processes because {why}; move it to a "
                 'file and name it "file.py:Class", or leave workers out, which flies in this process'
             )
     return processors() if number is None else int(number)

@@ -8,7 +8,7 @@ from typing import Any
 class WingslevelError(ValueError):
     """A name, a value, a file or flight code that cannot be used: one line that says what would be right.
 
-    A flight that ends badly is no error: see `Flight.outcome`.
+    A flight that ends badly is not an error: see `Flight.outcome`.
     """
 
 

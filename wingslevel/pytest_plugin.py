@@ -35,6 +35,12 @@ class _Task(NamedTuple):
     options: Mapping[str, Any]
 
 
+class _Unusable(NamedTuple):
+    """What is wrong with a mark."""
+
+    problem: str
+
+
 class _Flown(NamedTuple):
     """A flight that was flown, and what keeps its recording."""
 
@@ -69,27 +75,34 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if not marks:
         return
     if "flown" not in metafunc.fixturenames:
-        raise pytest.UsageError(f"{definition.nodeid}: a test marked flight takes the argument flown")
-    flights = [task for mark in reversed(marks) for task in _tasks(mark, metafunc.config, definition)]
+        return  # see pytest_runtest_setup
+    try:
+        flights = [task for mark in reversed(marks) for task in _tasks(mark, metafunc.config, definition)]
+    except (TypeError, ValueError) as problem:  # one error for this test; the other tests of its file run
+        metafunc.parametrize("flown", [_Unusable(str(problem))], indirect=True, ids=["unusable"])
+        return
     ids = [f"{_stem(task.scenario)}-seed{task.seed}" for task in flights]
     if len(set(ids)) < len(ids):
         ids = [f"{_stem(t.scenario)}-{_name(t.options.get('estimator'))}-seed{t.seed}" for t in flights]
     metafunc.parametrize("flown", flights, indirect=True, ids=ids)
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Fail a marked test that does not take its flight."""
+    if item.get_closest_marker("flight") and "flown" not in getattr(item, "fixturenames", ("flown",)):
+        pytest.fail("a test marked flight takes the argument flown", pytrace=False)
+
+
 def _tasks(mark: pytest.Mark, config: pytest.Config, item: pytest.Item) -> list[_Task]:
     options = dict(mark.kwargs)
     arguments = [*mark.args, *([options.pop("scenario")] if "scenario" in options else [])]
     if len(arguments) != 1:
-        raise pytest.UsageError(f"{item.nodeid}: mark it flight(scenario, estimator=..., seeds=...)")
+        raise ValueError("mark it with pytest.mark.flight(scenario, estimator=..., seeds=...)")
     named = options.pop("seeds", None)
     seeds = config.getoption("--wl-seeds") or (config.getini("wl_seeds") or 0 if named is None else named)
     places = {name: _beside(options[name], item.path.parent) for name in ("estimator",) if name in options}
     scenario = _beside(arguments[0], item.path.parent)
-    try:
-        return [_Task(scenario, seed, {**options, **places}) for seed in _seeds(seeds)]
-    except (TypeError, ValueError) as problem:
-        raise pytest.UsageError(f"{item.nodeid}: {problem}") from None
+    return [_Task(scenario, seed, {**options, **places}) for seed in _seeds(seeds)]
 
 
 def _seeds(seeds: Any) -> list[int]:
@@ -112,20 +125,21 @@ def _beside(named: Any, folder: Path) -> Any:
 
 
 @pytest.fixture
-def flown(
-    request: pytest.FixtureRequest,
-    record_property: Callable[[str, object], None],
-    tmp_path_factory: pytest.TempPathFactory,
-) -> "Flight":
+def flown(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> "Flight":
     """The flight of this test, as `wingslevel.fly` returns it."""
     import wingslevel as wl
 
-    task: _Task | None = getattr(request, "param", None)
+    task: _Task | _Unusable | None = getattr(request, "param", None)
     if task is None:
         pytest.fail("flown: mark the test with pytest.mark.flight(scenario, ...)", pytrace=False)
+    if isinstance(task, _Unusable):
+        pytest.fail(task.problem, pytrace=False)
+    flight, problem = None, ""
     try:
         flight = wl.fly(task.scenario, seed=task.seed, **task.options)
-    except (wl.WingslevelError, TypeError) as problem:
+    except (wl.WingslevelError, TypeError) as error:
+        problem = str(error)
+    if flight is None:  # out of the except block: pytest prints an exception that is being handled as well
         pytest.fail(f"cannot fly {_stem(task.scenario)}: {problem}", pytrace=False)
     name = f"{flight.scenario}-{_name(flight.estimator)}-seed{flight.seed}"
     kept: list[str] = []
@@ -133,13 +147,14 @@ def flown(
     def keep(into: Path | None = None) -> str:
         if not kept:
             kept.append(str(_save(flight, into or tmp_path_factory.mktemp("flights"), name)))
-            record_property("recording", kept[0])
+            request.node.user_properties.append(("recording", kept[0]))
         return kept[0]
 
-    record_property("flight", f"{flight.scenario}, {_name(flight.estimator)}, seed {flight.seed}")
-    for number in _NUMBERS:
-        if (value := flight.metrics.get(number)) is not None:
-            record_property(number, value)
+    # Not by record_property, which warns under --junitxml.
+    request.node.user_properties.append(("flight", f"{flight.scenario}, {_name(flight.estimator)}, seed {flight.seed}"))
+    request.node.user_properties.extend(
+        (number, value) for number in _NUMBERS if (value := flight.metrics.get(number)) is not None
+    )
     request.node.stash[_flown] = _Flown(flight, _again(task, request.node), keep)
     if out := _folder(request.config):
         keep(out)
@@ -175,7 +190,7 @@ def within(request: pytest.FixtureRequest) -> Callable[..., None]:
     def _within(flight: "Flight", **limits: float | tuple[float | None, float | None]) -> None:
         __tracebackhide__ = True
         if not limits:
-            raise TypeError("within: name a metric and its limit, for instance inclination_rms_deg=4.0")
+            pytest.fail("within: name a metric and its limit, for instance inclination_rms_deg=4.0", pytrace=False)
         lines = [*_endings(flight), *filter(None, (_line(flight, *limit) for limit in limits.items()))]
         if lines:
             raise AssertionError("\n".join(["; ".join(lines), *_pointers(request.node)]))
@@ -193,7 +208,7 @@ def _line(flight: "Flight", name: str, limit: Any) -> str:
     if name not in flight.metrics:
         from sim.params import near_misses
 
-        raise ValueError(f"within: unknown metric {name!r}: {near_misses(name, flight.metrics)}")
+        pytest.fail(f"within: unknown metric {name!r}: {near_misses(name, flight.metrics)}", pytrace=False)
     low, high = limit if isinstance(limit, tuple) else (None, limit)
     value = flight.metrics[name]
     if value is None:
@@ -233,7 +248,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
         message = "" if crash is None else str(crash.message).removeprefix("AssertionError: ")
         if pointers[0] in message:  # of `within`
             crash.message, pointers = message, []
-        elif crash is not None and verdict:
+        elif crash is not None and verdict and call.excinfo is not None and call.excinfo.errisinstance(AssertionError):
             crash.message = "\n".join(["; ".join([*_endings(kept.flight), *verdict]), message])
         report.sections.append(("flight", "\n".join([repr(kept.flight), *verdict, *pointers])))
     return report

@@ -166,7 +166,7 @@ class CEstimator:
         self._reply[:] = _EMPTY
         status = self._update(self._object, self._into, self._from)
         if status:
-            raise Refused(f"update returned {status}, must return 0")
+            raise Refused(f"update returned {status}; it must return 0")
         health, wind_n_m_s = self._health.value, self._wind_n_m_s.value
         return AttitudeEstimate(
             self._R_eb.copy(),
@@ -276,12 +276,12 @@ def _loaded(path: Path, file: Library) -> _Functions:
 
 
 def _check_kind(path: Path) -> None:
-    """Refuse what is no shared library, or one for another processor, in better words than the loader has."""
+    """Refuse what is not a shared library, or one for another processor, in better words than the loader has."""
     with path.open("rb") as file:
         head = file.read(20)
     if head[:4] != b"\x7fELF":
         if sys.platform == "linux":
-            raise Refused(f"{path.name} is no shared library: build one with cc -shared -fPIC")
+            raise Refused(f"{path.name} is not a shared library: build one with cc -shared -fPIC")
         return
     order: Any = "little" if head[5:6] != b"\x02" else "big"
     machine = int.from_bytes(head[18:20], order)
@@ -303,11 +303,11 @@ def _described(functions: _Functions, of: Library) -> _Described:
     if d.struct_size < ctypes.sizeof(_Description) or d.parameter_size < ctypes.sizeof(_Parameter):
         raise Refused(f"{file} describes itself in {d.struct_size} and {d.parameter_size} bytes, too few: {again}")
     if d.heading_reference >= len(_REFERENCES):
-        raise Refused(f"{file}: heading_reference is {d.heading_reference}, must be 0 (course) or 1 (nose)")
+        raise Refused(f"{file}: heading_reference is {d.heading_reference}; it must be 0 (course) or 1 (nose)")
     if d.uses >> len(_INSTRUMENTS):
-        raise Refused(f"{file}: uses is {d.uses:#x}, must be made of the bits of {', '.join(_INSTRUMENTS)}")
+        raise Refused(f"{file}: uses is {d.uses:#x}; it must be made of the bits of {', '.join(_INSTRUMENTS)}")
     if d.parameter_count > _MOST_PARAMETERS or (d.parameter_count and not d.parameters):
-        raise Refused(f"{file}: {d.parameter_count} parameters, must be an array of up to {_MOST_PARAMETERS}")
+        raise Refused(f"{file}: {d.parameter_count} parameters; at most {_MOST_PARAMETERS} are possible")
     name = _identifier(file, "name", d.name)
     parameters: list[tuple[str, str, float, str]] = []
     for i in range(d.parameter_count):
@@ -325,7 +325,7 @@ def _described(functions: _Functions, of: Library) -> _Described:
 def _identifier(file: str, what: str, text: bytes | None) -> str:
     name = _text(text)
     if not name.isidentifier() or keyword.iskeyword(name):
-        raise Refused(f"{file}: {what} is called {name!r}, must be an identifier of letters, digits and _")
+        raise Refused(f"{file}: {what} is called {name!r}; it must be an identifier of letters, digits and _")
     return name
 
 

@@ -23,9 +23,9 @@ class _NotMeasured(RuntimeError):
 
 
 def _measured(value: Measured) -> Measured:
-    """What a metric returned, as plain numbers; Refused if it is no Measured."""
+    """What a metric returned, as plain numbers; Refused if it is not a Measured."""
     if not isinstance(value, Measured):
-        raise Refused(f"its metric returned {shown(value)}, must return a Measured")
+        raise Refused(f"its metric returned {shown(value)}; it must return a Measured")
     return Measured(float(value.value), int(value.samples), int(value.expected))
 
 

@@ -196,18 +196,20 @@ def learnt(estimator: object, known: Mapping[str, Known]) -> dict[str, Known]:
 
     Raises
     ------
-    PluginError      one line: it raises, or is no mapping from properties of the instruments to their values
+    PluginError      one line: it raises, or is not a mapping from properties of the instruments to their values
     """
     with refusing(ESTIMATOR, class_name(estimator), home_of(estimator)):
         found = getattr(estimator, "learnt", None)
         if found is None:
             return dict(known)
         if not isinstance(found, Mapping):
-            raise Refused(f"learnt is {shown(found)}, must be a mapping from properties of the instruments to values")
+            raise Refused(
+                f"learnt is {shown(found)}; it must be a mapping from properties of the instruments to values"
+            )
         reported = {}
         for name, value in found.items():  # not more than there are properties: others are refused
             if not isinstance(name, str) or not isinstance(value, numbers.Real):
-                raise Refused(f"learnt holds {shown(name)}: {shown(value)}, must hold names and numbers")
+                raise Refused(f"learnt holds {shown(name)}: {shown(value)}; it must hold names and numbers")
             try:
                 reported[str(name)] = Known(property_value(name, value), "learnt")
             except ValueError as error:
@@ -225,7 +227,7 @@ def uses_of(estimator: object, instead: tuple[str, ...]) -> tuple[str, ...]:
     with refusing(ESTIMATOR, class_name(estimator), home_of(estimator)):
         uses = getattr(estimator, "uses", instead)
         if not isinstance(uses, tuple | list | set | frozenset) or not all(isinstance(name, str) for name in uses):
-            raise Refused(f"uses is {shown(uses)}, must be names of instruments, such as ('gyro', 'gps')")
+            raise Refused(f"uses is {shown(uses)}; it must be names of instruments, such as ('gyro', 'gps')")
         return tuple(uses)
 
 

@@ -23,6 +23,7 @@ PREFIX = "wingslevel"
 _PACKAGES = ("estimator", "autopilot", "sim", "scenarios")
 _HOME = Path(__file__).resolve().parents[2]
 LIBRARIES = (".so", ".dylib", ".dll")
+SOURCES = (".c", ".cc", ".cpp", ".cxx", ".c++", ".h", ".hpp", ".rs")
 _run: dict[str, ModuleType] = {}  # modules that were made here, by name
 _running: set[Path] = set()  # files whose code is being run
 
@@ -50,6 +51,27 @@ def library_named(spec: str) -> Library | None:
         return Library(Path(spec))
     file, colon, prefix = spec.rpartition(":")
     return Library(Path(file), prefix) if colon and file.endswith(LIBRARIES) else None
+
+
+def hint_for_file(spec: str, *, libraries: bool) -> str:
+    """What to write instead of `spec`, if that is a Python file without a class, or a source file; empty otherwise.
+
+    libraries : whether a shared library can be used as well
+    """
+    file = next((each for each in (spec, spec.rpartition(":")[0]) if each.endswith(SOURCES)), "")
+    if file and libraries:
+        return f"{file} is a source file: build a shared library from it first (docs/c_estimators.md)"
+    path = Path(spec)
+    if path.suffix != ".py":
+        return ""
+    if not path.is_file():
+        return f"no file {spec!r}"
+    try:
+        classes = [node for node in ast.parse(path.read_bytes()).body if isinstance(node, ast.ClassDef)]
+    except (OSError, SyntaxError, ValueError, RecursionError, MemoryError):  # anyone's file
+        classes = []
+    classes.sort(key=lambda node: all(getattr(each, "name", "") != "update" for each in node.body))
+    return f"{spec}: name the class in it, for instance {spec}:{classes[0].name if classes else 'Class'}"
 
 
 def module_of_file(path: Path, refuse: Callable[[str], Exception]) -> ModuleType:

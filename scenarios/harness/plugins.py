@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from autopilot import AUTOPILOTS
 from estimator import ESTIMATORS
 from scenarios.harness import lent
-from scenarios.harness.own_files import also_import_from, library_named, module_of_file
+from scenarios.harness.own_files import also_import_from, hint_for_file, library_named, module_of_file
 from sim.outside.blame import Refused, home_of, shown, theirs
 from sim.outside.entry_points import Offer, offered
 from sim.outside.wording import class_name, printable
@@ -46,7 +46,7 @@ class Kind(NamedTuple):
     arguments: tuple[str, ...]
 
 
-NOT_SET = {"params", "instruments", "self"}  # arguments of constructors that are no settings
+NOT_SET = {"params", "instruments", "self"}  # arguments of constructors that are not settings
 ESTIMATOR = Kind("estimator", _ALL_ESTIMATORS, ("measurements",))
 AUTOPILOT = Kind("autopilot", AUTOPILOTS, ("estimate", "measurements", "setpoint"))
 OURS: Mapping[str, Mapping[str, str]] = {f"{kind.word}s": kind.registry for kind in (ESTIMATOR, AUTOPILOT)}
@@ -129,8 +129,8 @@ def _offered(kind: Kind) -> dict[str, str]:
 def require_maker(kind: Kind, spec: "str | Maker", maker: Any) -> None:
     if not callable(maker):
         raise PluginError(
-            f"{kind.word} {maker_name(spec)!r}: {shown(maker)} is no class; name the class, or a function that makes a "
-            "new one for each flight"
+            f"{kind.word} {maker_name(spec)!r}: {shown(maker)} is not a class; name the class, or a function that "
+            "makes a new one for each flight"
         )
 
 
@@ -158,6 +158,8 @@ def find_maker(kind: Kind, spec: str) -> Any:
             return class_of_library(library)
     if spec in kind.registry:
         spec = kind.registry[spec]
+    elif instead := hint_for_file(spec, libraries=kind is ESTIMATOR):
+        raise PluginError(instead)
     elif ":" not in spec:
         installed = _installed(kind)
         if spec in installed:
@@ -208,4 +210,6 @@ def check_update(kind: Kind, spec: "str | Maker", made: Any) -> None:
         try:
             signature.bind(*kind.arguments)
         except TypeError:
-            raise Refused(f"{class_name(made)}.update takes {signature}, must be {wanted}") from None
+            raise Refused(
+                f"{class_name(made)}.update() takes {signature}; define it as update(self, {', '.join(kind.arguments)})"
+            ) from None

@@ -105,7 +105,9 @@ def _from_offer(offer: Offer) -> Scenario:
         found = offer.load()
         scenario = _of(found) if isinstance(found, ModuleType) else found
         if not issubclass(type(scenario), Scenario):
-            raise Refused(f"{offer.value} is {shown(scenario)}, must be a Scenario, or a module that exports SCENARIO")
+            raise Refused(
+                f"{offer.value} is {shown(scenario)}; it must be a Scenario, or a module that exports SCENARIO"
+            )
         return replace(scenario, name=offer.name)
 
 

@@ -187,7 +187,7 @@ def _reports(estimator: object, known: Mapping[str, Known], t_s: float) -> dict[
         rejected = getattr(estimator, "rejected", None)
         refused = getattr(estimator, "refused", {})
         if not isinstance(refused, Mapping) or len(refused) > MOST_REFUSED:
-            raise Refused(f"refused is {shown(refused)}, must be numbers of samples by instrument")
+            raise Refused(f"refused is {shown(refused)}; it must be numbers of samples by instrument")
         counts = {printable(str(name)): _count(f"refused[{shown(name)}]", n) for name, n in refused.items()}
         n_rejected = None if rejected is None else _count("rejected", rejected)
         return {"known": now_known, "rejected": n_rejected, "refused": counts}
@@ -199,7 +199,7 @@ def _count(name: str, value: object) -> int:
     except TypeError:
         number = -1
     if not 0 <= number < 2**63:
-        raise Refused(f"{name} is {shown(value)}, must be a number of samples")
+        raise Refused(f"{name} is {shown(value)}; it must be a number of samples")
     return int(number)
 
 

@@ -53,7 +53,7 @@ class Scenario:
             ("expected_to_fail", "True or False", isinstance(self.expected_to_fail, bool)),
         ):
             if not fits:
-                raise ValueError(f"scenario {self.name}: {name} is {shown(getattr(self, name))}, must be {right}")
+                raise ValueError(f"scenario {self.name}: {name} is {shown(getattr(self, name))}; it must be {right}")
         names = [check.name for check in self.checks]
         twice = {name for name in names if names.count(name) > 1}
         if not names or twice:
@@ -101,12 +101,12 @@ class Scenario:
         with theirs(lambda line: ScriptFailed(f"scenario {self.name}: script: {line}"), home_of(self.script)):
             script = self.script(config)
             if type(script) is not Script:
-                raise Refused(f"it returned {shown(script)}, must return a Script")
+                raise Refused(f"it returned {shown(script)}; it must return a Script")
             for t_s, setpoint in script:
                 if type(setpoint) is not Setpoint:
-                    raise Refused(f"at {t_s:g} s it asks for {shown(setpoint)}, must be a Setpoint")
+                    raise Refused(f"at {t_s:g} s it asks for {shown(setpoint)}; it must ask for a Setpoint")
                 if setpoint.mode not in tuple(Mode):
-                    raise Refused(f"at {t_s:g} s it asks for mode {shown(setpoint.mode)}, must be a Mode")
+                    raise Refused(f"at {t_s:g} s it asks for mode {shown(setpoint.mode)}; it must ask for a Mode")
             return script
 
     def events(self, flight: Flight) -> tuple[tuple[Event, ...], str]:

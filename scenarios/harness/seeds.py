@@ -21,7 +21,9 @@ def parse_seeds(text: str) -> list[int]:
             raise ValueError(f"seeds = {text!r}: {right}")
         first, last = int(found[1]), int(found[2] or found[1])
         if not first <= last <= LARGEST_SEED:
-            raise ValueError(f"seeds = {text!r}: {part.strip()} is no range of seeds from 0 to {LARGEST_SEED}; {right}")
+            raise ValueError(
+                f"seeds = {text!r}: {part.strip()} is not a range of seeds from 0 to {LARGEST_SEED}; {right}"
+            )
         if last - first + len(seeds) >= MOST_SEEDS:
             raise ValueError(f"seeds = {text!r}: more than {MOST_SEEDS} at once are too many; split them")
         seeds |= dict.fromkeys(range(first, last + 1))

@@ -133,7 +133,7 @@ def _files_of(offer: Offer) -> dict[str, str]:
         found = offer.resource() or offer.load()
         path = os.fspath(found) if isinstance(found, str | os.PathLike) else ""
         if not isinstance(path, str) or not path.endswith(".toml"):
-            raise Refused(f"{offer.value} is {shown(found)}, must be the path of a .toml file")
+            raise Refused(f"{offer.value} is {shown(found)}; it must be the path of a .toml file")
     try:
         text = read_text(Path(path), NO_FILES, "sensor suite")
         return {offer.name: text} | _part_files(read_toml(path, text), Path(path).parent, Path(offer.name))

@@ -79,7 +79,12 @@ QUICK = ("--set", "duration_s=2", "--no-rerun", "--json", "-")
         ("abort()", (), "worker_died", "was killed by signal 6"),
         ("_exit(0)", (), "worker_died", "ended by itself (exit code 0)"),
         ("exit(0)", (), "worker_died", "ended by itself (exit code 0)"),
-        ("for (;;) nowhere = 0", ("--flight-timeout", "3"), "timed_out", "did not answer when the time was up"),
+        (
+            "for (;;) nowhere = 0",
+            ("--flight-timeout", "3"),
+            "timed_out",
+            "gave no answer within the time limit and was stopped",
+        ),
     ],
 )
 def test_fly_library_that_crashes_is_reported_with_exit_code_1(crashing, tmp_path, crash, options, outcome, says):

@@ -128,7 +128,12 @@ def wingslevel(here: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     [
         ("Leaves", (), "worker_died", "the process ended by itself (exit code 0)"),
         ("Killed", (), "worker_died", "the process was killed by signal 9 (Killed)"),
-        ("Deaf", ("--flight-timeout", "2"), "timed_out", "the process did not answer when the time was up"),
+        (
+            "Deaf",
+            ("--flight-timeout", "2"),
+            "timed_out",
+            "the process gave no answer within the time limit and was stopped",
+        ),
     ],
 )
 def test_fly_estimator_that_ends_its_process_is_reported_with_exit_code_1(

@@ -146,6 +146,13 @@ def here(tmp_path: Path, monkeypatch) -> Path:
     return tmp_path
 
 
+def test_getting_started_installs_what_its_steps_use() -> None:
+    """The page's own command is enough for its last steps, which use pytest and pandas."""
+    (install,) = [c for b in blocks_of("docs/getting_started.md") for c in commands_of(b) if c.startswith("pip ")]
+    assert install == 'pip install ".[pandas]" pytest'
+    assert "pandas" in tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+
+
 def test_exceptions_are_all_needed() -> None:
     """An entry of the tables goes when its command goes, and most commands are run."""
     every = every_command()

@@ -85,7 +85,7 @@ def test_record_command_in_an_unknown_mode_is_refused_with_those_there_are(flown
 
 @pytest.mark.parametrize("answer", [None, np.eye(3), (np.eye(3), np.zeros(3))])
 def test_record_of_something_that_is_no_answer_says_what_is_wanted(flown, answer):
-    with pytest.raises(Unusable, match=r"update\(\) returned \w+, must return an AttitudeEstimate"):
+    with pytest.raises(Unusable, match=r"update\(\) returned \w+; it must return an AttitudeEstimate"):
         record_estimate(flown, 0, answer)
-    with pytest.raises(Unusable, match=r"update\(\) returned \w+, must return an ActuatorCommand"):
+    with pytest.raises(Unusable, match=r"update\(\) returned \w+; it must return an ActuatorCommand"):
         record_command(flown, 0, answer)

@@ -85,10 +85,10 @@ def test_agree_command_tells_the_worst_and_its_exit_code(tmp_path: Path, capsys)
         (tmp_path / name).write_text(json.dumps(data))
     a, b, c = (str(tmp_path / name) for name in "abc")
     assert run(["agree", a, b]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].startswith("agree: 1 flights, 2 values, 0 of them equal")
+    assert capsys.readouterr().out.splitlines()[-1].startswith("agree: 1 flight, 2 values, 0 of them equal")
     assert run(["--quiet", "agree", a, c, "--json", str(tmp_path / "out.json")]) == 1
     out = capsys.readouterr().out
-    assert out == "DISAGREE in 2 values and 0 other things: 1 flights, 2 values, 0 of them equal to the last bit\n"
+    assert out == "DISAGREE in 2 values and 0 other things: 1 flight, 2 values, 0 of them equal to the last bit\n"
     told = json.loads((tmp_path / "out.json").read_text())
     assert (told["agree"], told["differences"][0]["difference"], told["differences"][0]["agrees"]) == (
         False,
@@ -103,8 +103,11 @@ def test_agree_command_tells_the_worst_and_its_exit_code(tmp_path: Path, capsys)
         ("", "not JSON"),
         ("[1]", "holds no flights"),
         ('{"flights": []}', "holds no flights"),
-        ('{"flights": [3]}', "is no verdict on a flight"),
-        ('{"flights": [{"scenario": "x", "estimator": "y", "checks": [{"name": "n"}]}]}', "is no verdict on a flight"),
+        ('{"flights": [3]}', "is not a verdict on a flight"),
+        (
+            '{"flights": [{"scenario": "x", "estimator": "y", "checks": [{"name": "n"}]}]}',
+            "is not a verdict on a flight",
+        ),
         ("[" * 100_000, "not JSON"),
     ],
 )

@@ -104,8 +104,8 @@ def test_estimate_as_a_table() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"gyro_b_rad_s": np.zeros((1000, 2))}, r"gyro_b_rad_s has shape \(1000, 2\), must be \(N, 3\)"),
-        ({"gyro_b_rad_s": "fast"}, "gyro_b_rad_s is no array of numbers"),
+        ({"gyro_b_rad_s": np.zeros((1000, 2))}, r"gyro_b_rad_s has shape \(1000, 2\); it must be \(N, 3\)"),
+        ({"gyro_b_rad_s": "fast"}, "gyro_b_rad_s is not an array of numbers"),
         ({"force_b_m_s2": np.zeros((7, 3))}, "force_b_m_s2 has 7 rows, gyro_b_rad_s has 1000"),
         ({"t_s": np.arange(7)}, "t_s has 7 rows, gyro_b_rad_s has 1000"),
         ({"t_s": np.zeros(1000)}, r"t_s\[1\] = 0 s follows 0 s"),

@@ -392,10 +392,10 @@ def test_row_beyond_the_log_is_no_read_beyond_it(level):
         ({"VERSION": "0"}, "is built for version 0"),
         ({"FOUND": "NULL"}, "level.so does not offer version 1 of the interface"),
         ({"SIZE": "8"}, "describes itself in 8 and 32 bytes, too few"),
-        ({"REFERENCE": "7"}, "heading_reference is 7, must be 0 (course) or 1 (nose)"),
-        ({"USES": "64"}, "uses is 0x40, must be made of the bits of gyro"),
-        ({"NAME": '"two words"'}, "name is called 'two words', must be an identifier"),
-        ({"NAME": "NULL"}, "name is called '', must be an identifier"),
+        ({"REFERENCE": "7"}, "heading_reference is 7; it must be 0 (course) or 1 (nose)"),
+        ({"USES": "64"}, "uses is 0x40; it must be made of the bits of gyro"),
+        ({"NAME": '"two words"'}, "name is called 'two words'; it must be an identifier"),
+        ({"NAME": "NULL"}, "name is called ''; it must be an identifier"),
         ({"SECOND": '"k_p"'}, "two parameters are called k_p"),
         ({"SECOND": '"a.b"'}, "parameter 1 is called 'a.b'"),
         ({"PREFIX": "other"}, "has no function wingslevel_describe: declare all five with WINGSLEVEL_ESTIMATOR(wingsl"),
@@ -420,7 +420,7 @@ def test_file_that_is_no_library_is_one_line_and_exit_code_2(example, capsys):
     """Missing, text, of another machine, cut short: in words that say what to do."""
     _refused(capsys, "./absent.so", "no file 'absent.so'")
     Path("text.so").write_text("int main;", encoding="utf-8")
-    _refused(capsys, "./text.so", "text.so is no shared library: build one with cc -shared -fPIC")
+    _refused(capsys, "./text.so", "text.so is not a shared library: build one with cc -shared -fPIC")
     data = bytearray(example.read_bytes())
     Path("cut.so").write_bytes(data[:100])
     _refused(capsys, "./cut.so", "cannot be loaded: ")
@@ -440,7 +440,7 @@ def test_prefix_names_one_of_several_estimators_of_a_library(level):
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
-        ("return 3", "update returned 3, must return 0"),
+        ("return 3", "update returned 3; it must return 0"),
         ("e->R_eb[0][0]=NAN", "R_eb is not finite"),
         ("e->R_eb[0][0]=2", "R_eb is not a rotation"),
         ("e->health=9", "health is"),

@@ -1,6 +1,7 @@
 """Bad input on the command line: one clear line, exit code 2, nothing written."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -157,6 +158,16 @@ def test_quiet_before_or_after_the_command_prints_nothing_but_reports(where: int
     assert run(arguments) == 0
     assert capfd.readouterr() == ("", "")
     assert "crosswind" in (tmp_path / "list.json").read_text()
+
+
+@pytest.mark.parametrize(
+    ("duration", "code", "line"),
+    [("1", 1, r"FAILED: \d of (\d) checks passed\n"), ("40", 0, r"passed: (\d) of \1 checks\n")],
+)
+def test_quiet_flight_prints_one_line(duration: str, code: int, line: str, tmp_path: Path, capfd) -> None:
+    """The word is that of the verdict."""
+    assert run(["fly", "hand_launch", "-q", "--no-rerun", "--duration", duration, "--out", str(tmp_path)]) == code
+    assert re.fullmatch(line, capfd.readouterr().out)
 
 
 def test_quiet_is_forgotten_by_the_next_command(capfd) -> None:

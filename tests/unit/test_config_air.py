@@ -45,8 +45,8 @@ def test_parse_gust_of_what_people_type(text, gust):
         ("4@12s:up:down", "4@12s"),
         ("nan@12s", "4@12s"),
         ("99@12s", "99 m/s is too much, at most 30 m/s"),
-        ("4@-1s", "starts at -1 s, must be 0 to 36000 s"),
-        ("4@12s/0s", "is 0 s long, must be above 0"),
+        ("4@-1s", "starts at -1 s; it must start 0 to 36000 s"),
+        ("4@12s/0s", "is 0 s long; it must be above 0"),
         ("4@12s:400", "400 deg is outside 0 to 360 deg"),
     ],
 )

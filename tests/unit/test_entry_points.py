@@ -129,11 +129,11 @@ def test_list_shows_where_each_comes_from_and_what_is_broken(package: Path, caps
     assert broken == {
         "raising": "RuntimeError: no licence (raising.py, line 1)",
         "missing": "ModuleNotFoundError: No module named 'no_such_package'",
-        "number": "3 is no class; name the class, or a function that makes a new one for each flight",
+        "number": "3 is not a class; name the class, or a function that makes a new one for each flight",
         "malformed": "'what is this?' must be package.module:Name",
-        "storm_number": f"{package.name}.storm:NUMBER is 3, must be a Scenario, or a module that exports SCENARIO",
+        "storm_number": f"{package.name}.storm:NUMBER is 3; it must be a Scenario, or a module that exports SCENARIO",
         "bench_gone": f"sensor suite '{package / 'gone.toml'}': no such file",
-        "bench_number": f"{package.name}.storm:NUMBER is 3, must be the path of a .toml file",
+        "bench_number": f"{package.name}.storm:NUMBER is 3; it must be the path of a .toml file",
     }
     assert found["notes"] == [f"estimator premerlani of {origin} is ignored: wingslevel has one of that name"]
 
@@ -194,7 +194,7 @@ def test_table_has_a_heading_for_each_package(capsys) -> None:
         (("fly", "storm", "--estimator", "raising"), "RuntimeError: no licence (raising.py, line 1)"),
         (("fly", "storm", "--estimator", "missing"), "No module named 'no_such_package'"),
         (("check", "storm_number", "--seeds", "0"), "must be a Scenario"),
-        (("compare", "storm", "--estimators", "my_filter,number"), "3 is no class"),
+        (("compare", "storm", "--estimators", "my_filter,number"), "3 is not a class"),
         (("fly", "storm", "--sensors", "bench_gone"), "no such file"),
         (("fly", "strom"), "did you mean storm?"),
         (("fly", "storm", "--estimator", "my_filtre"), "did you mean my_filter?"),

@@ -60,14 +60,14 @@ def here(tmp_path: Path, monkeypatch) -> Path:
 @pytest.mark.parametrize(
     ("answer", "says"),
     [
-        (AttitudeEstimate(EYE.astype(object)), "R_eb is made of object, must be made of numbers"),
+        (AttitudeEstimate(EYE.astype(object)), "R_eb is made of object; it must be made of numbers"),
         (AttitudeEstimate(EYE.astype(str)), "R_eb is made of <U32"),
         (AttitudeEstimate(EYE + 0j), "R_eb is made of complex128"),
         (AttitudeEstimate(EYE.astype("M8[s]")), "R_eb is made of datetime64"),
         (AttitudeEstimate(np.ma.masked_array(EYE, EYE)), "R_eb has masked elements"),
         (AttitudeEstimate([[10**400, 0, 0], [0, 1, 0], [0, 0, 1]]), "R_eb is made of object"),
         (AttitudeEstimate(_Liar()), "R_eb has shape"),
-        (AttitudeEstimate(None), r"R_eb has shape \(\), must have shape \(3, 3\)"),
+        (AttitudeEstimate(None), r"R_eb has shape \(\); it must have shape \(3, 3\)"),
         (AttitudeEstimate("R"), "R_eb has shape"),
         (AttitudeEstimate(1e300 * EYE), "R_eb is not finite"),
         (AttitudeEstimate(EYE, np.full(3, 1e300)), r"omega_b_rad_s is not finite, or beyond 1e\+06 rad/s"),
@@ -80,8 +80,8 @@ def here(tmp_path: Path, monkeypatch) -> Path:
         (AttitudeEstimate(EYE, health=float("nan")), "it is nan"),
         (AttitudeEstimate(EYE, health=1.0), "it is 1.0"),
         (AttitudeEstimate(EYE, health=np.array([1, 2])), r"it is array\(\[1, 2\]\)"),
-        (_Own(EYE), "returned _Own, must return an AttitudeEstimate"),
-        (tuple.__new__(AttitudeEstimate, (EYE,)), "has 1 fields, must have 5"),
+        (_Own(EYE), "returned _Own; it must return an AttitudeEstimate"),
+        (tuple.__new__(AttitudeEstimate, (EYE,)), "has 1 fields; it must have 5"),
         (float("nan"), "returned float"),
     ],
 )
@@ -109,7 +109,7 @@ def test_record_estimate_hands_on_arrays_of_floats(flown):
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"aileron": "0"}, "aileron is '0', must be a number"),
+        ({"aileron": "0"}, "aileron is '0'; it must be a number"),
         ({"aileron": None}, "aileron is None"),
         ({"elevator": 1j}, "elevator is 1j"),
         ({"elevator": np.zeros(1)}, r"elevator is array\(\[0.\]\)"),
@@ -132,8 +132,8 @@ def test_record_command_of_a_hostile_answer_is_refused_by_name(flown, change, sa
 @pytest.mark.parametrize(
     ("returned", "says"),
     [
-        ("None", "replay() returned NoneType, must return a structured array of 200 rows with R_eb, omega_b_rad_s"),
-        ("np.zeros(200)", "replay() returned ndarray, must return a structured array"),
+        ("None", "replay() returned NoneType; it must return a structured array of 200 rows with R_eb, omega_b_rad_s"),
+        ("np.zeros(200)", "replay() returned ndarray; it must return a structured array"),
         ("e[:-1]", "replay() returned an array of shape (199,)"),
         ("e[['R_eb', 'health']]", "replay() returned an array without omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s"),
         ("spoilt('R_eb', 150, np.nan)", "Mine at 5.00 s: R_eb is not finite"),
@@ -144,7 +144,7 @@ def test_record_command_of_a_hostile_answer_is_refused_by_name(flown, change, sa
         ("spoilt('wind_e_m_s', 150, 1e300)", "Mine at 5.00 s: wind_e_m_s is beyond 1e+06 m/s"),
         ("spoilt('health', 150, 7)", "Mine at 5.00 s: health is not a Health"),
         ("spoilt('health', 150, -2**62)", "Mine at 5.00 s: health is not a Health"),
-        ("e.astype([(n, 'O') for n in e.dtype.names])", "R_eb has shape (200,), must have shape (200, 3, 3)"),
+        ("e.astype([(n, 'O') for n in e.dtype.names])", "R_eb has shape (200,); it must have shape (200, 3, 3)"),
         ("e.astype([(n, 'U9', e.dtype[n].shape) for n in e.dtype.names])", "R_eb is made of <U9"),
     ],
 )
@@ -177,17 +177,17 @@ class Mine:
 @pytest.mark.parametrize(
     ("said", "says"),
     [
-        ("rejected = float('nan')", "rejected is nan, must be a number of samples"),
+        ("rejected = float('nan')", "rejected is nan; it must be a number of samples"),
         ("rejected = 'many'", "rejected is 'many'"),
         ("rejected = -1", "rejected is -1"),
         ("rejected = 10**5000", "rejected is "),
-        ("refused = 'gps'", "refused is 'gps', must be numbers of samples by instrument"),
+        ("refused = 'gps'", "refused is 'gps'; it must be numbers of samples by instrument"),
         ("refused = {'gps': 'all'}", "refused['gps'] is 'all'"),
         ("refused = dict.fromkeys(range(100000), 1)", "refused is {0: 1"),
-        ("learnt = 'gps_latency_s'", "learnt is 'gps_latency_s', must be a mapping"),
+        ("learnt = 'gps_latency_s'", "learnt is 'gps_latency_s'; it must be a mapping"),
         ("learnt = float('nan')", "learnt is nan"),
         ("learnt = {'gps_latency_s': float('nan')}", "learnt: gps_latency_s = nan: must be a number"),
-        ("learnt = {'gps_latency_s': 'late'}", "learnt holds 'gps_latency_s': 'late', must hold names and numbers"),
+        ("learnt = {'gps_latency_s': 'late'}", "learnt holds 'gps_latency_s': 'late'; it must hold names and numbers"),
         ("learnt = {'gps_latncy_s': 0.3}", "learnt: unknown property of the instruments 'gps_latncy_s'"),
         ("learnt = {i: i for i in range(100000)}", "learnt holds 0: 0"),
     ],

@@ -87,7 +87,11 @@ def test_load_estimator_far_off_names_all_there_are() -> None:
     ("source", "name", "says"),
     [
         ("class Own: pass", "Own", r"Own has no method update\(measurements\)"),
-        ("class Own:\n def update(self, gyro, force): ...", "Own", r"update takes \(gyro, force\), must be update\("),
+        (
+            "class Own:\n def update(self, gyro, force): ...",
+            "Own",
+            r"update\(\) takes \(gyro, force\); define it as update\(self, measurements\)",
+        ),
         (FINE, "Fien", "did you mean Fine"),
         ("x = 1", "Own", "defines no class"),
         ("class Own\n pass", "Own", "SyntaxError"),
@@ -96,7 +100,7 @@ def test_load_estimator_far_off_names_all_there_are() -> None:
         (
             "class Own:\n heading_reference = 'north'\n def update(self, m): ...",
             "Own",
-            "'north', must be 'course' or 'nose'",
+            "'north'; it must be 'course' or 'nose'",
         ),
         (
             "class Own:\n def __init__(self): raise RuntimeError('two\\nlines')\n def update(self, m): ...",
@@ -110,7 +114,22 @@ def test_load_estimator_unusable_is_refused_in_one_line(file_of, source: str, na
     assert re.search(says, refusal(f"{file_of(source)}:{name}"))
 
 
-@pytest.mark.parametrize("spec", ["no_such_file.py:Own", "no_such_module_anywhere:Own"])
+def test_load_estimator_from_a_file_without_a_class_names_one_in_it(file_of) -> None:
+    """The class with an update, found without running the file; no list of all estimators."""
+    path = file_of("raise RuntimeError\nclass Helper: ...\n" + FINE)
+    assert refusal(str(path)) == f"{path}: name the class in it, for instance {path}:Fine"
+    path.write_text("class Own\n")
+    assert refusal(str(path)) == f"{path}: name the class in it, for instance {path}:Class"
+
+
+@pytest.mark.parametrize("spec", ["./mine.c", "src/filter.cpp", "lib.rs", "./mine.c:mine"])
+def test_load_estimator_from_a_source_file_says_to_build_a_library(spec: str) -> None:
+    """With the page that says how."""
+    file = spec.removesuffix(":mine")
+    assert refusal(spec) == f"{file} is a source file: build a shared library from it first (docs/c_estimators.md)"
+
+
+@pytest.mark.parametrize("spec", ["no_such_file.py", "no_such_file.py:Own", "no_such_module_anywhere:Own"])
 def test_load_estimator_from_nowhere_is_refused(spec: str) -> None:
     """A file or module that is not there is named."""
     assert spec.partition(":")[0] in refusal(spec)
@@ -144,7 +163,7 @@ def test_load_autopilot_for_an_aircraft_that_it_has_no_gains_for_is_refused() ->
 
 def test_load_autopilot_with_the_update_of_an_estimator_is_refused(file_of) -> None:
     """An estimator named in the place of an autopilot is noticed."""
-    with pytest.raises(plugins.PluginError, match=r"must be update\(estimate, measurements, setpoint\)"):
+    with pytest.raises(plugins.PluginError, match=r"define it as update\(self, estimate, measurements, setpoint\)"):
         equipping.load_autopilot(f"{file_of(FINE)}:Fine")
 
 

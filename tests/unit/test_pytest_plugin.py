@@ -190,16 +190,23 @@ def test_module(flown):
     ("marker", "arguments", "says"),
     [
         ('"crosswind"', "", "a test marked flight takes the argument flown"),
-        ("", "flown", "mark it flight(scenario, estimator=..., seeds=...)"),
+        ("", "flown", "mark it with pytest.mark.flight(scenario, estimator=..., seeds=...)"),
         ('"crosswind", seeds="0-"', "flown", "seeds = '0-': write numbers and ranges"),
     ],
 )
-def test_marker_that_cannot_be_is_a_usage_error(plugged, marker: str, arguments: str, says: str) -> None:
-    """At collection, in one line."""
-    plugged.makepyfile(f"import pytest\n\n@pytest.mark.flight({marker})\ndef test_it({arguments}):\n    ...\n")
+def test_marker_that_cannot_be_used_is_an_error_of_that_test(plugged, marker: str, arguments: str, says: str) -> None:
+    """In one line; the other tests of the file run."""
+    plugged.makepyfile(
+        f"import pytest\n\n@pytest.mark.flight({marker})\ndef test_it({arguments}):\n    ...\n\ndef test_other(): ...\n"
+    )
     result = run(plugged)
-    assert result.ret != 0
-    assert says in result.stdout.str() + result.stderr.str()
+    result.assert_outcomes(passed=1, errors=1)
+    out = result.stdout.str()
+    assert [line for line in out.splitlines() if says in line and not line.startswith("ERROR ")] == [
+        next(line for line in out.splitlines() if line.removeprefix("E").strip().startswith(says))
+    ]
+    assert "Traceback" not in out
+    assert "pytest_plugin.py" not in out
 
 
 def test_flight_that_cannot_be_flown_is_one_line(plugged: pytest.Pytester) -> None:
@@ -224,10 +231,52 @@ def test_metric(flown, within):
     result = run(plugged)
     result.assert_outcomes(failed=1, errors=3)
     out = result.stdout.str()
-    assert "cannot fly crosswnd: unknown scenario 'crosswnd': did you mean crosswind" in out
+    details, summary = out.split("short test summary info")
+    for text in (
+        "cannot fly crosswnd: unknown scenario 'crosswnd': did you mean crosswind",
+        "cannot fly crosswind: ",
+        "mark the test with pytest.mark.flight",
+        "unknown metric 'inclination_rms': did you mean inclination_rms_deg",
+    ):
+        assert (details.count(text), summary.count(text)) == (1, 1), text
     assert "wind" in next(line for line in out.splitlines() if "cannot fly crosswind" in line)
-    assert "mark the test with pytest.mark.flight" in out
-    assert "unknown metric 'inclination_rms': did you mean inclination_rms_deg" in out
+    assert "During handling" not in out
+    assert "pytest_plugin.py" not in details
+    assert re.search(r"^FAILED \S+::test_metric\[crosswind-seed0\] - (Failed: )?within: unknown metric", summary, re.M)
+
+
+def test_junit_report_of_one_process_warns_of_nothing(plugged: pytest.Pytester) -> None:
+    """Warnings are errors here; the numbers are in the report."""
+    plugged.makepyfile(
+        """
+import pytest
+
+@pytest.mark.flight("crosswind", duration=1)
+def test_it(flown): ...
+"""
+    )
+    result = run(plugged, "--junitxml=report.xml")
+    result.assert_outcomes(passed=1)
+    assert "warning" not in result.stdout.str().lower()
+    (case,) = ElementTree.parse(plugged.path / "report.xml").iter("testcase")
+    assert {p.get("name") for p in case.iter("property")} == {"flight", "inclination_rms_deg", "heading_rms_deg"}
+
+
+def test_error_in_a_test_is_not_hidden_by_the_verdict(plugged: pytest.Pytester) -> None:
+    """The summary names the exception, not a check that failed as well."""
+    plugged.makepyfile(
+        """
+import pytest
+
+@pytest.mark.flight("crosswind", duration=1, seeds=3)
+def test_it(flown):
+    assert not flown.passed
+    flown.metrics["no_such_metric"]
+"""
+    )
+    result = run(plugged)
+    result.assert_outcomes(failed=1)
+    assert re.search(r"^FAILED \S+ - KeyError: 'no_such_metric'", result.stdout.str(), re.M)
 
 
 def test_flight_that_ends_early_is_never_within(plugged: pytest.Pytester) -> None:

@@ -96,7 +96,7 @@ def test_terminal_of_any_text_prints_it_and_obeys_none(text: str, monkeypatch) -
     assert all(c == "\n" or c.isprintable() for c in shown)
     assert "1234" in shown
     assert "5678" in shown
-    assert "passed: 0 of 1 flights, 0 of 1 scenarios pooled" in shown
+    assert "FAILED: 0 of 1 flights, 0 of 1 scenarios pooled passed" in shown
 
 
 @pytest.mark.parametrize("columns", [1, 20, 40, 60, 80])

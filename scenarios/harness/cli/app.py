@@ -97,7 +97,7 @@ def _root(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Show the version and stop.")] = False,
     quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print only errors and the result; also after the command.")
+        bool, typer.Option("--quiet", "-q", help="Print only errors and the result; may also follow the command.")
     ] = False,
     traceback: Annotated[
         bool, typer.Option("--traceback", help="Show the whole traceback if your own code raises.")
@@ -197,13 +197,13 @@ def agree(
         float,
         typer.Option(
             metavar="REL",
-            help="Relative tolerance; those by unit scale with it. 0 requires equal values.",
+            help="Relative tolerance; per-unit absolute tolerances scale with it. 0 requires equal values.",
             parser=number_in(0.0, 10.0, ""),
         ),
     ] = 0.05,
     report_only: Annotated[
         str,
-        typer.Option(metavar="NAME,...", help="Scenarios or patterns whose values are not judged, or none."),
+        typer.Option(metavar="NAME,...", help="Scenarios or patterns whose values are not judged, or 'none'."),
     ] = "faults",
     json_: JsonOption = None,
 ) -> int:

@@ -25,7 +25,7 @@ KindArgument = Annotated[
     str | None,
     typer.Argument(help="scenarios, estimators, autopilots, aircraft, suites or parts.", autocompletion=complete.kinds),
 ]
-NamesArgument = Annotated[list[str] | None, typer.Argument(help="Names to list. \\[default: all of that kind]")]
+NamesArgument = Annotated[list[str] | None, typer.Argument(help="Only these names. \\[default: all of that kind]")]
 ParamsOption = Annotated[bool, typer.Option("--params", help="List the parameters of estimators, for --set.")]
 EstimatorOption = Annotated[
     str | None,
@@ -43,7 +43,7 @@ SetOption = Annotated[
 WindOption = Annotated[
     str | None,
     typer.Option(
-        "--wind", metavar="M/S@DEG", help="Wind speed and direction it blows from: 5@270, 5@cross, 5@head, calm."
+        "--wind", metavar="M/S@DEG", help="Wind speed and the direction it blows from: 5@270, 5@cross, 5@head, calm."
     ),
 ]
 ShearOption = Annotated[
@@ -110,7 +110,7 @@ FaultOption = Annotated[
     ),
 ]
 JsonOption = Annotated[
-    str | None, typer.Option("--json", metavar="FILE", help="Write the results as JSON; - is standard output.")
+    str | None, typer.Option("--json", metavar="FILE", help="Write the results as JSON; - writes to standard output.")
 ]
 WebOption = Annotated[bool, typer.Option("--web", help="Use the viewer in a browser.")]
 WorkersOption = Annotated[
@@ -131,7 +131,7 @@ FlightTimeoutOption = Annotated[
 PictureOption = Annotated[
     Path | None, typer.Option("--picture", metavar="FILE", help="Draw a picture: PNG, SVG or PDF.")
 ]
-NoRerunOption = Annotated[bool, typer.Option("--no-rerun", help="Record Parquet only.")]
+NoRerunOption = Annotated[bool, typer.Option("--no-rerun", help="Record Parquet only, no .rrd.")]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the recordings.")]
 SeedsOption = Annotated[str, typer.Option("--seeds", metavar="LIST", help="Seeds to fly: 0-9 or 0,2,5-7.")]
 LedgerOption = Annotated[
@@ -143,7 +143,7 @@ LedgerOption = Annotated[
 FLIGHT_TIMEOUT_S = 600.0
 PageOption = Annotated[
     Path | None,
-    typer.Option(metavar="FILE", help="Of scenarios: write the catalogue, with stories, limits, values and margins."),
+    typer.Option(metavar="FILE", help="With scenarios: write the catalogue, with stories, limits, values and margins."),
 ]
 VerdictOption = Annotated[
     Path | None,
@@ -154,7 +154,7 @@ CalibrationOption = Annotated[
     float | None,
     typer.Option(
         metavar="S",
-        help="Seconds averaged at the start for the power-up, if at rest; 0 is none. \\[default: 2]",
+        help="Average the first S seconds as the power-up sample, if at rest; 0 disables it. \\[default: 2]",
         parser=number_in(-1e6, 1e6, "s"),
     ),
 ]

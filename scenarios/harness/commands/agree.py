@@ -18,6 +18,7 @@ from typing import Any
 
 from scenarios.harness.cli import console
 from scenarios.harness.cli.reports import reporting, usage
+from scenarios.harness.verdict import counted
 from sim.outside.wording import brief
 
 RELATIVE = 0.05  # of the larger of the two values; `ABSOLUTE` is added
@@ -90,11 +91,11 @@ class Agreement:
         return 0 if self.agree else 1
 
     def worst(self) -> list[Difference]:
-        """The differences that are no zero, the largest first, by what is allowed."""
+        """The differences that are not zero, the largest first, by what is allowed."""
         return sorted((d for d in self.differences if d.size), key=lambda d: -d.ratio)
 
     def to_json(self) -> dict[str, Any]:
-        """All of it as plain data; of the differences those that are no zero, the largest first."""
+        """All of it as plain data; of the differences those that are not zero, the largest first."""
         return {
             "agree": self.agree, "flights": self.n_flights, "values": len(self.differences),
             "tolerance": {"relative": self.tolerance, "absolute": _absolute(self.tolerance)},
@@ -122,7 +123,9 @@ def read(path: Path) -> dict[str, Any]:
         raise ValueError(f"{path}: holds no flights; write it with wingslevel check --json")
     for entry in (*flights, *_list(data.get("pooled"))):
         if not _is_verdict(entry):
-            raise ValueError(f"{path}: {brief(entry)} is no verdict on a flight; write it with wingslevel check --json")
+            raise ValueError(
+                f"{path}: {brief(entry)} is not a verdict on a flight; write it with wingslevel check --json"
+            )
     return data
 
 
@@ -230,7 +233,7 @@ def print_report(agreement: Agreement) -> None:
         console.line(f"and {len(agreement.others) - SHOWN} more", "red")
     equal, apart = len(agreement.differences) - len(worst), len(agreement.disagreeing)
     counts = (
-        f"{agreement.n_flights} flights, {len(agreement.differences)} values, {equal} of them equal to the last bit"
+        f"{counted(agreement.n_flights)}, {len(agreement.differences)} values, {equal} of them equal to the last bit"
     )
     word = "agree" if agreement.agree else f"DISAGREE in {apart} values and {len(agreement.others)} other things"
     console.last(f"{word}: {counts}")

@@ -111,7 +111,8 @@ def print_report(verdict: Verdict) -> None:
             console.line(f"FAIL {flight.scenario}, seed {flight.seed}: {why}", "red")
     flights, pooled = (f"{sum(v.passed for v in vs)} of {len(vs)}" for vs in (verdict.flights, verdict.pooled))
     missing = f"; {verdict.missing_text}" if verdict.missing else ""
-    console.last(f"passed: {flights} flights, {pooled} scenarios pooled{missing}")
+    word, ending = ("passed", "") if verdict.passed else ("FAILED", " passed")
+    console.last(f"{word}: {flights} flights, {pooled} scenarios pooled{ending}{missing}")
 
 
 @dataclass(frozen=True, slots=True)

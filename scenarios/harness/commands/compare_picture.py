@@ -144,7 +144,7 @@ def _spread(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> No
     ax.axhline(95.0, color=FAINT, lw=0.8, ls=(0, (4, 3)), zorder=1)
     ax.set(xscale="log", xlim=(0.8 * low, 1.15 * high), ylim=(0.0, 101.0))
     ax.set(xlabel="inclination error, deg", ylabel="time spent below it, %")
-    ax.set_title("How it is spread", pad=15)
+    ax.set_title("Distribution of the error", pad=15)
     style.note(ax, "all seeds together     disc: 95 %")
     _log_degrees(ax.xaxis, 0.8 * low, 1.15 * high)
 
@@ -177,7 +177,7 @@ def _names(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> Non
                 color="white" if has else "#c5ccd3", bbox=box if has else None,
             )  # fmt: skip
     ax.set_title("Estimator", pad=15)
-    ax.text(0.995, 1.0, "was given", transform=ax.transAxes, fontsize=7.8, color=FAINT, ha="right", va="bottom")
+    ax.text(0.995, 1.0, "inputs used", transform=ax.transAxes, fontsize=7.8, color=FAINT, ha="right", va="bottom")
     meaning = "   ".join(f"{letter} {name}" + "\n" * (letter == "P") for name, letter in LETTERS.items())
     meaning = meaning.replace("\n   ", "\n")
     ax.text(0.0, -0.06, meaning, transform=ax.transAxes, fontsize=7.0, color=FAINT, va="top")
@@ -228,7 +228,7 @@ def _costs(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str]) -> Non
     ax.set_xticks([])
     ax.xaxis.set_minor_locator(NullLocator())
     ax.spines["bottom"].set_visible(False)
-    ax.set_title("An update costs", pad=15)
+    ax.set_title("Time per update", pad=15)
     head = {"transform": ax.transAxes, "fontsize": 7.8, "color": FAINT, "va": "bottom"}
     ax.text(0.0, 1.0, "* in Python" if any(e.cost and not e.cost.replay_ns for e in entrants) else "", **head)
     ax.text(0.82, 1.0, "lasted", ha="right", **head)

@@ -151,7 +151,11 @@ def print_report(flown: Flown) -> None:
     if flown.folder is not None:
         console.line(f"recording   {flown.folder}")
         console.line(f"to see it   wingslevel view {flown.folder}")
-    console.outcome(f"passed: {sum(row.passed for row in judged.rows)} of {len(judged.rows)} checks")
+    passed = sum(row.passed for row in judged.rows)
+    if judged.passed:
+        console.outcome(f"passed: {passed} of {len(judged.rows)} checks")
+    else:
+        console.outcome(f"FAILED: {passed} of {len(judged.rows)} checks passed")
 
 
 def _name(scenario: str, config: FlightConfig) -> str:

@@ -148,9 +148,11 @@ def parse_gust(text: str) -> GustConfig:
     if not abs(m_s) <= STRONGEST_M_S:
         raise ValueError(f"gust = {text!r}: {m_s:g} m/s is too much, at most {STRONGEST_M_S:g} m/s")
     if not 0.0 <= start_s <= 36000.0:
-        raise ValueError(f"gust = {text!r}: starts at {start_s:g} s, must be 0 to 36000 s after the release; {right}")
+        raise ValueError(
+            f"gust = {text!r}: starts at {start_s:g} s; it must start 0 to 36000 s after the release; {right}"
+        )
     if not 0.0 < length_s <= 600.0:
-        raise ValueError(f"gust = {text!r}: is {length_s:g} s long, must be above 0 and at most 600 s; {right}")
+        raise ValueError(f"gust = {text!r}: is {length_s:g} s long; it must be above 0 and at most 600 s; {right}")
     timing = {"start_s": start_s, "length_s": length_s}
     if towards in ("up", "down"):
         return GustConfig(m_s=0.0, up_m_s=m_s if towards == "up" else -m_s, from_deg=0.0, **timing)

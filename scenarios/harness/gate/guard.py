@@ -170,7 +170,7 @@ def _run(command: Callable[[], int]) -> tuple[_Heard, str]:
             signal.signal(number, handler)
         os.close(read)
     if heard.timed_out:
-        return heard, "did not answer when the time was up"
+        return heard, "gave no answer within the time limit and was stopped"
     return heard, _how(status)
 
 

@@ -30,7 +30,7 @@ def reached(p_e_m: Array, route: Sequence[Waypoint], near_m: float = REACHED_M) 
         apart_m = math.hypot(then.north_m - w.north_m, then.east_m - w.east_m)
         if apart_m <= 2.0 * near_m:
             apart = f"{tuple(w)} and {tuple(then)} m, {apart_m:g} m apart"
-            raise ValueError(f"route: {apart}, must be more than {2.0 * near_m:g} m")
+            raise ValueError(f"route: {apart}; the distance must be more than {2.0 * near_m:g} m")
     counts, k = np.zeros(len(p_e_m), np.int64), 0
     distances = [np.hypot(p_e_m[:, 0] - w.north_m, p_e_m[:, 1] - w.east_m) for w in route]
     while route:
