@@ -53,7 +53,8 @@ class ComplementaryParams(Params):
     bias_s : s  time constant of the gyro bias; keep it above 4 tilt_s
         higher: steadier bias; lower: follows a drifting gyro, overshoots after a large tilt error
     gps_latency_s : s  age of a fix on arrival, set from the data sheet of the receiver
-        higher: more of the turn since then is added to the course; lower: less.  An error turns the heading in turns
+        higher: more of the turn since then is added to the course; lower: less.  An error makes the heading wrong while
+        turning
     gps_filter_s : s  time constant of the receiver's velocity filter, likewise
         higher: as for the latency; lower: as for the latency
     """

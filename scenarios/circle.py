@@ -2,7 +2,7 @@
 
 =============  ===================================================================================================
 Story          The heading is unknown to the estimator at first.  The stick is moved over and held: 30 degrees of
-               bank to the right, four turns a minute.  All that time the accelerometer reads as in level flight, the
+               bank to the right, four turns a minute.  All that time the accelerometer points as in level flight, the
                course has changed by the time the GPS reports it, and the wind comes from every side in turn.
 Verifies       Premerlani & Bizard: in an aeroplane that never flies straight, the centrifugal term keeps the bank
                (Eqns 25-27) and the course keeps the heading (Eqns 22-24)

@@ -6,7 +6,7 @@ Story          The model is switched on and carried to the launch site, swaying 
                is unknown as always.  The autopilot detects the throw, climbs straight ahead to 30 m and holds the
                course.
                ``cold_start_moved``: calibrated for 2 s while it was waved about at up to 20 deg/s, so that the
-               measured offset is wrong; the hand stays as restless until the throw.
+               measured offset is wrong; it keeps moving as much until the throw.
                ``cold_start_no_gps``: not calibrated, and the first fix comes 30 s after the release.  Until then there
                is no course, no speed and no height
 Verifies       Premerlani & Bizard: the integral term finds the offset in flight (Eqns 28-29) and the course the

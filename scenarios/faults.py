@@ -4,7 +4,7 @@
 Story          Straight flight with two course reversals.  From 30 s on, through the first turn, every 50th gyro reading
                is off by 200 deg/s, up or down, which is within the range of the gyro and so passes a range check.  In
                the second turn the accelerometer sticks for 15 s at what it read in the turn.  Later the gyros and the
-               GPS return no numbers, for 1 s and 2 s.
+               GPS return NaN, for 1 s and 2 s.
 Verifies       Premerlani & Bizard: feedback removes what bad samples did to the matrix in about 10 seconds
                (Eqns 18-21, 25-29); a sample that is not a number must not stay in it
 Aircraft       endurance

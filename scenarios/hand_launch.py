@@ -15,7 +15,7 @@ Variants       ``calm``, without wind; ``head_wind`` and ``cross_wind``, 5 m/s, 
                4 m/s more from the side, beginning at the release and over within 2 s.  ``accelerometer`` shows a
                failure: if the vertical comes from the accelerometer alone, the throw, and then the thrust of the
                motor, reads as a climb, and the autopilot pushes the nose into the ground.  It passes if that happens
-               within seconds.  (A sailplane, which has no thrust, does not crash)
+               within seconds.  (A sailplane, which has no thrust, does not crash.)
 =============  ===================================================================================================
 """
 

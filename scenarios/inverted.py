@@ -9,8 +9,8 @@ Aircraft       endurance
 Wind           3 m/s from any direction, turbulence W20 = 3 m/s
 Sensors        generic
 Passes when    it survives and keeps its height; it was truly inverted for most of the minute, and its course turned
-               by three right angles meanwhile, less 36 degrees at most; inclination and heading errors are limited
-               while inverted, and from 10 to 30 s afterwards the inclination error is small
+               by three right angles meanwhile, at most 36 degrees short of them; inclination and heading errors are
+               limited while inverted, and from 10 to 30 s afterwards the inclination error is small
 =============  ===================================================================================================
 """
 

@@ -4,7 +4,7 @@
 Story          In flight, heading unknown to the estimator at first, along a figure of eight again and again: two
                squares with sides of 250 m that meet above the launch point, one flown to the right and one to the
                left, between 60 m and 120 m.  The wind is a third of the airspeed; gusts shake the wings all the time.
-Verifies       Premerlani & Bizard, as a whole: the attitude stays right for as long as one flies, and with position and
+Verifies       Premerlani & Bizard, as a whole: the attitude stays correct for the whole flight, and with position and
                course from the same receiver it is enough to navigate
 Aircraft       endurance
 Wind           4.5 m/s from any direction, turbulence W20 = 6 m/s

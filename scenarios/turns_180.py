@@ -1,7 +1,7 @@
 """Three course reversals in a crosswind.
 
 =============  ===================================================================================================
-Story          Straight across the wind, then three times about turn at 35 degrees of bank, with more than 30 s of
+Story          Straight across the wind, then three about-turns at 35 degrees of bank, with more than 30 s of
                straight flight between the turns.  Wind from the left becomes wind from the right: the nose turns by
                180 degrees plus or minus twice the crab angle, and what was learnt on the old course no longer holds.
 Verifies       Premerlani & Bizard: after a 180 degree turn in a crosswind the heading is off by up to twice the crab

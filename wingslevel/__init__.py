@@ -5,7 +5,7 @@
 Fly
 ---
 >>> flight = wl.fly("crosswind", estimator="premerlani", seed=3, wind="5@270")
->>> flight.passed, flight.metrics["inclination_rms_deg"]
+>>> flight.passed, flight.metrics["inclination_error_rms_deg"]
 >>> flight.plot().savefig("crosswind.png")
 >>> flight.save("flights/mine")               # wl.load("flights/mine") reads it again
 

@@ -79,8 +79,8 @@ def estimate(
 
     Raises
     ------
-    WingslevelError     shapes that do not fit, numbers that are none, times that do not increase, an estimator that
-                        cannot be found or that fails
+    WingslevelError     shapes that do not fit, NaN or non-numeric values, times that do not increase, an
+                        estimator that cannot be found or that fails
     """
     from scenarios.harness.replay import Window, replay
 

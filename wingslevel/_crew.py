@@ -39,7 +39,7 @@ def crew(workers: SupportsIndex | None, estimators: Mapping[str, Any]) -> int:
 
     Raises
     ------
-    WingslevelError     a number that cannot be, or several where an estimator cannot be sent
+    WingslevelError     an invalid number, or several where an estimator cannot be sent
     """
     from scenarios.harness import lent
     from scenarios.harness.cli.options import MOST_WORKERS

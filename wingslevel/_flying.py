@@ -48,7 +48,8 @@ def fly(
     estimator       registered name, ``module:Class``, ``file.py:Class``, ``library.so``, a class, or a function that
                     makes a new one; None is the one of the scenario
     params          its parameters by name
-    seed            another seed, another flight; the same seed, the same bits.  None is that of the scenario, 0
+    seed            selects noise, turbulence and throw; the same seed repeats the flight bit for bit.  None is that
+                    of the scenario, 0
     timeout         wall-clock limit, seconds; the flight then ends as "timed_out"
     progress        True shows a bar where it takes longer than two seconds; or a function of (done_s, total_s)
 
@@ -58,8 +59,8 @@ def fly(
 
     Raises
     ------
-    WingslevelError     one line: a scenario, an estimator or a value that cannot be; nothing has been flown then
-    Interrupted         Ctrl-C; its `result` is the flight up to there
+    WingslevelError     one line: an unknown scenario or estimator, or an invalid value; nothing has been flown then
+    Interrupted         Ctrl-C; its `result` is the flight up to that point
     """
     from scenarios.harness.flight import prepare
     from scenarios.harness.scenario import Scenario

@@ -85,14 +85,25 @@ def _time(figure: Figure, grid: Any, flight: "Flight") -> None:
         axis.axhline(0.0, color=FAINT, linewidth=0.8)
         axis.plot(t_s, error_deg, color=VIOLET, linewidth=1.2)
         axis.set_ylabel(label)
-        rms = flight.metrics.get(metric)
-        note = "not judged" if rms is None else f"RMS {number(rms)} deg"
-        axis.text(0.995, 0.92, note, transform=axis.transAxes, ha="right", va="top", color=VIOLET, fontsize=9)
+        axis.text(
+            0.995, 0.92, _rms(flight, metric), transform=axis.transAxes, ha="right", va="top", color=VIOLET, fontsize=9
+        )
     for axis in axes[:-1]:
         axis.tick_params(labelbottom=False)
     axes[-1].set_xlabel("time since the release, s")
     axes[0].set_xlim(float(t_s[0]), max(float(t_s[-1]), float(t_s[0]) + flight.dt_s))
     _events(axes, flight)
+
+
+def _rms(flight: "Flight", metric: str) -> str:
+    """The RMS of all errors after the release, and the one that a check of the scenario judges."""
+    rms, checked = (flight.metrics.get(name) for name in (metric, metric.replace("_rms_", "_error_rms_")))
+    if rms is None:
+        return "not judged"
+    if not flight.judged:
+        return f"RMS {number(rms)} deg"
+    note = f"RMS from the release {number(rms)} deg"
+    return note if checked is None else f"{note}, in the check {number(checked)} deg"
 
 
 def _events(axes: list[Any], flight: "Flight") -> None:
@@ -154,7 +165,9 @@ def _way(axis: Any, flight: "Flight") -> None:
             False
         )
     axis.plot(east_m[0], north_m[0], "o", color=INK, markersize=5, zorder=4)
-    axis.annotate("start", (east_m[0], north_m[0]), textcoords="offset points", xytext=(6, 5), fontsize=8)
+    westward = east_m[0] > 0.5 * (east_m.min() + east_m.max())  # the label stays clear of the colour bar
+    x, side = (-6, "right") if westward else (6, "left")
+    axis.annotate("start", (east_m[0], north_m[0]), textcoords="offset points", xytext=(x, 5), ha=side, fontsize=8)
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_title("over the ground")
     axis.set_xlabel("east, m")

@@ -64,7 +64,7 @@ class _Bar:
             self._bar.update(self._task, completed=done, total=total, what=self._what)
 
     def compiling(self, kernels: "Kernels") -> None:
-        """Count the kernels that are compiled, which takes a minute or two the first time."""
+        """Count the kernels that are compiled, which takes up to half a minute the first time."""
         if self._is_shown():
             self._bar.update(self._task, what=f"compiling: {kernels.compiled} kernels")
 

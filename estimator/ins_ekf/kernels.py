@@ -10,7 +10,7 @@ GAIN     3     relative gain error of each gyro axis
 FORCE    3     accelerometer bias, body axes
 LAG      3     velocity inside the receiver, behind its first-order filter, earth axes
 WIND     2     north and east velocity of the air
-LATENCY  1     time from a fix being true to its arrival
+LATENCY  1     age of a fix on arrival
 =======  ====  =====================================================================================
 
 An attitude error in earth axes separates the heading, which may be unknown, from the tilt, which is known.

@@ -31,7 +31,7 @@ class GpsVelocityParams(MagnetometerParams):
         higher: learning goes on in turns (inf: always); lower: less time to learn
     gps_filter_s : s  time constant of the receiver's velocity filter; a wrong value tilts the estimate in turns
         higher: the inertial side is filtered more; lower: less (0: not at all)
-    gps_latency_s : s  time from a fix being true to its arrival, at most 12.5; a wrong value tilts it in turns
+    gps_latency_s : s  age of a fix on arrival, at most 12.5; a wrong value tilts it in turns
         higher: a fix is compared with an older motion; lower: with a newer one
     gps_vertical_velocity : switch  the receiver reports a vertical velocity
         on: Eqn 4 compares all three components; off: the horizontal ones only

@@ -58,7 +58,7 @@ class InsEkfParams(MagnetometerParams):
         higher: smoother, slower to correct; lower: noise of the fixes gets in
     gps_filter_s : s  time constant of the receiver's velocity filter; the learnt latency absorbs most of an error
         higher: the modelled receiver lags more; lower: less (0: not at all)
-    gps_latency_s : s  time from a fix being true to its arrival, at most 12.5; an error shows until it is learnt
+    gps_latency_s : s  age of a fix on arrival, at most 12.5; an error shows until it is learnt
         higher: the filter runs further behind the present; lower: nearer to it
     gps_latency_sigma_s : s  sigma of that latency, which is learnt in flight
         higher: a wrong latency is learnt sooner; lower: the given one counts more (0: it is not learnt)

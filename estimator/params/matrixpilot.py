@@ -18,8 +18,9 @@ class MatrixPilotParams(Params):
         higher: heading errors fade sooner, but wind and course noise get in; lower: smoother, slower
     k_i_yaw : 1/s^2  integral gain of the yaw error
         higher: yaw offset is learnt sooner, but turns are learnt as offset; lower: steadier, slower
-    centrifugal_from_gps : switch  source of the centrifugal acceleration
-        on: omega x V with the GPS speed (Eqns 25-26, the firmware up to 2017); off: from the length of the force
+    centrifugal_from_gps : switch  centrifugal acceleration from omega x V with the GPS speed (Eqns 25-26, the firmware
+        up to 2017), not from the length of the force
+        on: turns tilt the estimate if the speed is missing or wrong; off: turns need no GPS
     keep_tilt : switch  how the matrix is renormalised
         on: the Z row keeps its direction (the firmware since 2017); off: Eqns 18-21
     forward_acceleration : switch  remove the change of airspeed between reports from the accelerometer
@@ -36,9 +37,10 @@ class MatrixPilotParams(Params):
         higher: a launch disturbs pitch more (inf: no limit); lower: a large pitch error fades more slowly
     min_speed_m_s : m/s  slowest ground speed at which a course is used
         higher: yaw stays uncorrected for longer at low speed; lower: the noisy course of a slow aeroplane is used
-    climb_from_height : switch  source of the sink rate.  With `crosswind`, suite apm2, seeds 0-2, "on" raises the tilt
-        error from 1.6 to 4.3 degrees: heights that are 0.5 m wrong at 5 Hz make 3.5 m/s of noise
-        on: the change of height between two reports, as the firmware does for NMEA receivers; off: the reported one
+    climb_from_height : switch  sink rate from the change of height between two reports, as the firmware does for NMEA
+        receivers, not the reported one
+        on: noise of the heights tilts the estimate (0.5 m at 5 Hz is 3.5 m/s; with `crosswind`, suite apm2, seeds 0-2,
+        4.3 degrees instead of 1.6); off: less noise, but the receiver must report a vertical velocity
     fixed_point : switch  arithmetic
         on: the firmware's 16-bit numbers; off: floating point
     """

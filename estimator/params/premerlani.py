@@ -32,9 +32,10 @@ class PremerlaniParams(Params):
         higher: learning goes on in turns and picks up their errors (inf: always); lower: less time to learn
     gps_lag_filter : switch  pass the nose through the receiver's filter and latency before comparing it with the course
         on: the course is compared with an equally late nose; off: a late receiver disturbs yaw and speed in turns
-    gps_filter_s : s  time constant of the receiver's velocity filter; a wrong value turns the heading in turns
+    gps_filter_s : s  time constant of the receiver's velocity filter; a wrong value makes the heading wrong while
+        turning
         higher: the nose is filtered more; lower: less (0: not at all)
-    gps_latency_s : s  time from a fix being true to its arrival, at most 12.5; a wrong value turns the heading in turns
+    gps_latency_s : s  age of a fix on arrival, at most 12.5; a wrong value makes the heading wrong while turning
         higher: a fix is compared with an older nose; lower: with a newer one
     rotate_history : switch  apply yaw corrections to the remembered noses too
         on: no receiver lag in the yaw loop, whatever its gain; off: a large `w_y` makes the heading oscillate

@@ -1,4 +1,4 @@
-"""Parameters of estimators by name, spelled alike in every command: ``--set k_p=0.5`` or ``--set my_filter.k_p=0.5``.
+"""Parameters of estimators by name, the same in every command: ``--set k_p=0.5`` or ``--set my_filter.k_p=0.5``.
 
 A name that begins with that of an estimator is for that one alone.  The name of an estimator in a file or a module is
 its class's, as it is (``MyFilter.k_p``) or in snake case (``my_filter.k_p``); that of a library is its file's.  Without

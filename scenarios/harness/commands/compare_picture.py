@@ -205,7 +205,7 @@ def _strips(ax: Any, entrants: Sequence[Entrant], colours: dict[str, str], which
     ax.set(xscale="log", xlim=(low, high * (high / low) ** (0.3 if which == "heading" else 0.22)))
     ax.set(xlabel="deg")
     ax.set_title(f"{which.capitalize()} error", pad=15)
-    style.note(ax, "dot: RMS of a seed     diamond: of all     bar: 95 % of all samples", 1.0, va="bottom")
+    style.note(ax, "dot: RMS of a seed    diamond: of all    bar: 95 % of samples", 1.0, va="bottom")
     _log_degrees(ax.xaxis, low, high)
 
 

@@ -55,6 +55,30 @@ class Cells(NamedTuple):
     pooled_margin: str = ""
 
 
+QUANTITIES = {
+    "estimator": ("estimator", ""),
+    "withheld": ("properties withheld from the estimator", ""),
+    "turn_table": ("calibration on a turn table", ""),
+    "faults": ("faults", ""),
+    "duration_s": ("length", "s"),
+    "start.sway_deg_s": ("sway in the hand", "deg/s"),
+    "start.calibration_s": ("calibration in the hand", "s"),
+    "start.height_m": ("height at the start", "m"),
+    "air.wind_m_s": ("wind", "m/s"),
+    "air.wind_from_deg": ("wind direction", "deg"),
+    "air.turbulence_w20_m_s": ("turbulence", "m/s at 20 ft"),
+    "rates.gps_hz": ("GPS rate", "Hz"),
+    "sensors.gps.latency_s": ("GPS latency", "s"),
+    "manoeuvre.turn_deg": ("turn", "deg"),
+    "manoeuvre.bank_deg": ("bank", "deg"),
+    "manoeuvre.every_s": ("time between turns", "s"),
+    "manoeuvre.height_m": ("height of the manoeuvre", "m"),
+    "manoeuvre.pitch_rate_deg_s": ("pitch rate", "deg/s"),
+}
+"""Words and unit of each field of the configuration that a variant changes; others appear by name."""
+NAMES_IN = {"estimator", "withheld", "faults"}  # their values are names as typed
+DIRECTIONS = {"random": "any", "cross": "from the side", "head": "from ahead", "tail": "from behind"}
+
 Numbers = Mapping[tuple[str, str], Cells]  # by scenario and check, as the page names it
 
 
@@ -210,7 +234,7 @@ def _section(family: Sequence[Scenario], numbers: Numbers) -> list[str]:
         if variants:
             lines += [f"### {scenario.name}" if scenario is not first else f"### {first.name} itself", ""]
         if scenario is not first:
-            lines += [f"{markdown(scenario.summary)} Differs by {_changes(first, scenario)}.", ""]
+            lines += [f"{markdown(scenario.summary)} Differs in {_changes(first, scenario)}.", ""]
         if scenario.expected_to_fail:
             lines += ["Shows a failure: it passes only if its own estimator fails as the paper predicts.", ""]
         lines += [f"<!-- checks of {scenario.name} -->", "", COLUMNS, RULE, *_rows(scenario, numbers), ""]
@@ -218,7 +242,7 @@ def _section(family: Sequence[Scenario], numbers: Numbers) -> list[str]:
 
 
 def _sentence(text: str) -> str:
-    return text if text.endswith(".") else f"{text}."
+    return text if text.endswith((".", ".)")) else f"{text}."
 
 
 def _rows(scenario: Scenario, numbers: Numbers) -> Iterator[str]:
@@ -238,10 +262,36 @@ def _limit(check: Check, limit: float) -> str:
 
 
 def _changes(first: Scenario, variant: Scenario) -> str:
-    """What the configuration of a variant changes, as ``name = value``, and whether the script is another."""
+    """What the configuration of a variant changes, as ``quantity (value)``, and whether the script is another."""
     before, now = (_flat(s.config.model_dump(mode="json")) for s in (first, variant))
-    changed = [f"`{name}` = {_value(value)}" for name, value in now.items() if before.get(name) != value]
-    return ", ".join(changed + ["its script"] * (variant.script is not first.script))
+    if not now["air.wind_m_s"]:
+        now["air.wind_from_deg"] = before["air.wind_from_deg"]
+    changed = [_change(name, value) for name, value in now.items() if before.get(name) != value]
+    changed += ["its script"] * (variant.script is not first.script)
+    return " and ".join([", ".join(changed[:-1]), changed[-1]] if len(changed) > 1 else changed)
+
+
+def _change(name: str, value: Any) -> str:
+    """A changed field of the configuration in words."""
+    if name == "air.gusts":
+        return " and ".join(map(_gust, value)) or "gusts (none)"
+    quantity, unit = QUANTITIES.get(name, (f"`{name}`", ""))
+    if name in NAMES_IN and value:
+        return f"{quantity} (`{_value(value).replace(', ', '`, `')}`)"
+    if name == "air.wind_from_deg" and value in DIRECTIONS:
+        return f"{quantity} ({DIRECTIONS[value]})"
+    if unit and value == 0.0:
+        return f"{quantity} (none)"
+    return f"{quantity} ({_value(value)}{f' {unit}' if unit else ''})"
+
+
+def _gust(gust: Mapping[str, Any]) -> str:
+    along = gust["from_deg"]
+    whence = f"{along} the wind" if isinstance(along, str) else f"from {along:g} degrees"
+    parts = [f"a gust of {gust['m_s']:g} m/s {whence}"] if gust["m_s"] else []
+    parts += [f"{gust['up_m_s']:g} m/s upwards"] if gust["up_m_s"] else []
+    end_s = gust["start_s"] + gust["length_s"]
+    return f"{' and '.join(parts)} from {gust['start_s']:g} s to {end_s:g} s after the release"
 
 
 def _flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -252,8 +302,8 @@ def _flat(data: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _value(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {_value(item)}" for name, item in value.items())
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, list):
         return ", ".join(map(_value, value)) or "none"
     return f"{value:g}" if isinstance(value, float) else markdown(str(value))
