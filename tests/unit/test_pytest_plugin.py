@@ -6,6 +6,7 @@ import shlex
 import xml.etree.ElementTree as ElementTree
 from importlib.metadata import entry_points
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -51,6 +52,8 @@ def plugged(pytester: pytest.Pytester, monkeypatch) -> pytest.Pytester:
     """A folder of tests; processes started in it find compiled kernels where this one does."""
     monkeypatch.setenv("XDG_CACHE_HOME", KERNELS)
     monkeypatch.setenv("COLUMNS", "300")
+    # The modules that a test loads stay: numba cannot be loaded a second time in one process.
+    monkeypatch.setattr(pytester, "_sys_modules_snapshot", SimpleNamespace(restore=lambda: None))
     return pytester
 
 
