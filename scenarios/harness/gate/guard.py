@@ -184,7 +184,10 @@ def _live(command: Callable[[], int], child: _Child, signals: list[signal.Signal
             signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
         with listening():
             signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
-            code = command()
+            try:
+                code = command()
+            finally:  # a signal that comes now is too late: it must not end this process before its code is sent
+                signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     except KeyboardInterrupt:  # before `run` had begun, or after it had ended
         if code is None:
             code = INTERRUPTED
@@ -192,6 +195,8 @@ def _live(command: Callable[[], int], child: _Child, signals: list[signal.Signal
     except BaseException as error:  # `run` answers for all that can be foreseen
         sys.stderr.write(f"wingslevel: internal error: {described(error)}\n")
     finally:
+        for number in signals:  # for other threads, which have a mask of their own
+            signal.signal(number, signal.SIG_IGN)
         code = BROKEN if code is None else code
         _flush()
         _send(done=code)
