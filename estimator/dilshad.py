@@ -92,7 +92,7 @@ STATE_DTYPE = state_dtype(DilshadParams, *FIELD, *_STATE)
 
 @kernel
 def heading_of_field(m, f):  # type: ignore[no-untyped-def]
-    """Magnetic heading square to the wings, from north over east (Eqns 5 to 7); NaN where there is none.
+    """Magnetic heading square to the wings, from north over east (Eqns 5 to 7); NaN without a field.
 
     Parameters
     ----------

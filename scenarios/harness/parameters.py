@@ -130,7 +130,7 @@ def _parameter(path: str, default: Any, texts: Mapping[str, tuple[str, str, str,
 
 
 def _arguments(cls: type) -> dict[str, Any]:
-    """Arguments of a constructor that can be set, with their defaults, None where there is none."""
+    """Arguments of a constructor that can be set, with their defaults, None without a default."""
     try:
         arguments = inspect.signature(cls).parameters.values()
     except (TypeError, ValueError):  # compiled code that does not say

@@ -155,7 +155,7 @@ def print_report(export: Export) -> None:
 
 
 def _span(fixes: Fixes) -> tuple[float | None, float | None]:
-    """The first and the last stamp; None if there is none."""
+    """The first and the last stamp; None without fixes."""
     stamps = [float(t) for t in fixes.t_s if math.isfinite(t)]
     return (min(stamps), max(stamps)) if stamps else (None, None)
 

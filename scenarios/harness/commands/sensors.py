@@ -234,7 +234,7 @@ def _setting(name: str) -> str:
 
 
 def _figures(about: Subject, kind: str) -> Any:
-    """Figures of the data sheet, or all of them if there is none."""
+    """Figures of the data sheet; without a data sheet, all figures."""
     params = about.devices[kind]
     rows = []
     for f in fields(params):

@@ -24,7 +24,7 @@ def write_rerun(flight: Flight, folder: Path) -> Path:
 
 
 def newest(below: Path) -> Path:
-    """The recording below the folder `below` that was written last; ValueError if there is none."""
+    """The newest recording in the folder `below`; ValueError if it holds none."""
     found = below.glob(f"*/{recording.PARQUET}")
     latest = max(found, key=lambda path: path.stat().st_mtime, default=None)
     if latest is None:

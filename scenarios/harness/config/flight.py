@@ -290,7 +290,7 @@ def is_field(name: str, config: FlightConfig, overrides: Mapping[str, Any]) -> b
 
 
 def _field(name: str, config: FlightConfig, fitted: SuiteParams) -> str:
-    """Dotted name of a field that exists, empty where there is none; `fitted` is its suite."""
+    """Dotted name of a field that exists, empty if it does not exist; `fitted` is its suite."""
     if name in dotted_fields(fitted):
         return f"sensors.{name}"
     if name in PROPERTIES:
@@ -300,7 +300,7 @@ def _field(name: str, config: FlightConfig, fitted: SuiteParams) -> str:
 
 
 def _parameter(name: str, config: FlightConfig, fitted: SuiteParams, estimator: str | Maker) -> str:
-    """Dotted name of a parameter of the estimator, or a ValueError with the names that come near."""
+    """Dotted name of a parameter of the estimator, or a ValueError with suggestions."""
     require_fitted(fitted, name.removeprefix("sensors."), f"sensor suite {config.suite}")
     return parameter_name(name, estimator, [*_known(config, fitted), *dotted_fields(fitted)])
 

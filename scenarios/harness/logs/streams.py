@@ -99,7 +99,7 @@ def switched_off(stream: Stream, sensor: str, why: str) -> tuple[Stream, dict[st
 
 
 def first_known(logged: Iterable[tuple[Stream, Kind]]) -> tuple[Stream | None, Kind]:
-    """The first of the attitudes `logged` that has a number; if none has, the first one; if there is none, None."""
+    """The first attitude in `logged` with a number, else the first; None if `logged` is empty."""
     first: tuple[Stream | None, Kind] = None, "filter"
     for stream, kind in logged:
         if np.isfinite(stream.values).all(axis=1).any():
