@@ -27,7 +27,7 @@ from scenarios.harness.plugins import (
 )
 from sim.outside.blame import Refused, home_of, place_of, shown
 from sim.outside.wording import class_name, described, printable
-from sim.params import changed, dotted_fields
+from sim.params import changed, dotted_fields, near_misses
 
 if TYPE_CHECKING:
     from autopilot.interface import Autopilot
@@ -131,6 +131,11 @@ def _equipped(
             given = {place: values[name] for name, place in places.items() if name in values}
             return Equipped(_with_params(kind, spec, params, given | changes, maker, offered) or code, known)
     elif unheard := [name for name in settings if name not in of_constructor]:
+        settable = sorted(asked - {*NOT_SET, *also})
+        if settable and params is None:
+            raise ValueError(
+                f"{kind.word} {maker_name(spec)!r} has no parameter {unheard[0]!r}: {near_misses(unheard[0], settable)}"
+            )
         raise ValueError(
             f"{kind.word} {maker_name(spec)!r} has no parameter {unheard[0]!r}: its constructor does not take it, and "
             "it has no dataclass params" + ("" if params is None else " that can be set: what a function made is kept")

@@ -85,7 +85,7 @@ def test_parameters_and_arguments_of_one_class_are_both_flown():
     ("overrides", "maker", "says"),
     [
         ({"estimator_params.k_q": 1.0}, Mine, "unknown parameter 'k_q' of estimator .*Mine: did you mean k_p"),
-        ({"estimator_params.k_q": 1.0}, ByArgument, "has no parameter 'k_q': its constructor does not take it"),
+        ({"estimator_params.k_q": 1.0}, ByArgument, "has no parameter 'k_q': did you mean k_p"),
         ({"estimator_params.k_q": 1.0}, made_here, "has no parameter 'k_q'.*: what a function made is kept"),
         ({"estimator_params.gps_latency_s": 1.0}, made_here, "has no parameter 'gps_latency_s'"),
         ({"estimator_params.k_p": "x"}, Mine, "k_p = 'x' of estimator .*Mine: must be a number"),

@@ -184,3 +184,18 @@ def test_parameters_of_a_class_that_takes_none_are_refused_in_one_line():
     with pytest.raises(ValueError, match=r"its class must take its params as an argument"):
         equipping.equipped(_TakesNothing, settings={"gain": 2.0})
     assert equipping.equipped(_TakesNothing).code.params.gain == 1.0
+
+
+class _TakesPull:
+    def __init__(self, pull=0.2):
+        self.pull = pull
+
+    def update(self, measurements):
+        return None
+
+
+def test_misspelt_argument_of_a_constructor_gets_a_suggestion():
+    """As a misspelt field of a parameter dataclass does."""
+    with pytest.raises(ValueError, match=r"_TakesPull' has no parameter 'pul': did you mean pull"):
+        equipping.equipped(_TakesPull, settings={"pul": 1.0})
+    assert equipping.equipped(_TakesPull, settings={"pull": 1.0}).code.pull == 1.0
