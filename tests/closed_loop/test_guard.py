@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 from pathlib import Path
 
@@ -267,3 +268,27 @@ def test_estimator_that_ends_its_process_unwatched_is_exit_code_2(here: Path, co
     done = wingslevel(here, command, *log, "--estimator", "own.py:Unborn", "--json", "-")
     assert (done.returncode, done.stdout) == (2, "")
     assert "ended by itself (exit code 0) before anything was flown or written" in done.stderr
+
+
+@pytest.mark.parametrize("from_thread", [False, True])
+def test_signal_after_the_end_of_a_command_does_not_change_its_exit_code(from_thread: bool) -> None:
+    """Between the end of the command and the sending of its code; also a signal that another thread receives."""
+    program = f"""
+        import os, signal, sys, threading, time
+        from scenarios.harness.gate import guard
+
+        def command():
+            guard.stage("while it judged", guard.BROKEN)
+            if {from_thread}:
+                threading.Thread(target=time.sleep, args=(5.0,), daemon=True).start()
+            return 1
+
+        def late():
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(0.1)
+
+        guard._flush = late
+        sys.exit(guard.guarded(command))
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(program)], check=False, timeout=60)
+    assert done.returncode == 1
