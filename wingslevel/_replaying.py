@@ -62,6 +62,11 @@ class Replay:
         """What else is worth saying."""
         return (*self._done.log.notes, *self._done.notes, *self._notes)
 
+    @property
+    def not_judged(self) -> str:
+        """Why nothing was judged; empty if something was."""
+        return self._done.not_judged
+
     def to_json(self) -> dict[str, Any]:
         """As ``replay --json`` writes it."""
         return self._done.to_json()
@@ -84,7 +89,8 @@ class Replay:
         return len(self._done.replays)
 
     def __repr__(self) -> str:
-        return f"<Replay of {self._done.log.name}: {', '.join(self.estimators)}>"
+        nothing = f"; nothing judged: {self.not_judged}" if self.not_judged else ""
+        return f"<Replay of {self._done.log.name}: {', '.join(self.estimators)}{nothing}>"
 
     def _repr_html_(self) -> str:
         log = self._done.log

@@ -211,12 +211,21 @@ def test_replay_takes_a_class_and_shows_itself(tmp_path: Path) -> None:
     (folder,) = (tmp_path / "out").iterdir()
     assert repr(wl.load(folder)) == repr(flight)
     assert "replay of" in repr(flight)
-    assert repr(result) == "<Replay of log: Level>"
+    assert (repr(result), result.not_judged) == ("<Replay of log: Level>", "")
     assert "Level" in result._repr_html_()
     assert list(result.to_pandas()["estimator"]) == ["Level"]
     assert flight.plot().axes
     with pytest.raises(wl.WingslevelError, match="no verdict"):
         flight.verdict  # noqa: B018 - it raises
+
+
+def test_replay_that_judges_nothing_says_why(tmp_path: Path) -> None:
+    """It does not pass, and its one line is no list of good numbers."""
+    log = wl.fly("hand_launch", duration=2).save(tmp_path / "log", rerun=False)
+    result = wl.replay(log, Level, airborne=100)
+    assert not result.passed
+    assert result.not_judged in repr(result)
+    assert "100 m/s" in result.not_judged
 
 
 @pytest.mark.parametrize(
