@@ -164,7 +164,7 @@ def mode_in_force(setpoint, height_m, s, p, dt_s):  # type: ignore[no-untyped-de
     mode = led_by(setpoint, s)
     if mode in (MANUAL, RATE):
         return mode, mode
-    in_hand = mode == LAUNCH and s.thrown_s < 0.0
+    in_hand = mode == LAUNCH and s.thrown_s <= 0.0
     if not s.believed and not in_hand:
         return LEVEL, LEVEL
     launched = mode == LAUNCH and s.levelled_off
