@@ -70,7 +70,7 @@ def _is_met(fault: Fault, held_s: float, duration_s: float) -> bool:
     return fault.from_s < duration_s and fault.to_s > -held_s
 
 
-def require_faults_possible(faults: Sequence[str], suite: Any) -> None:
-    """ValueError for a fault of a sensor that `suite` does not have."""
+def require_faults_possible(faults: Sequence[str], suite: Any, gps_hz: float | None = None) -> None:
+    """ValueError for a fault that the sensors of `suite` cannot have; `gps_hz` is None for the receiver's own rate."""
     for fault in faults:
-        require_possible(parse_fault(fault), suite)
+        require_possible(parse_fault(fault), suite, gps_hz)

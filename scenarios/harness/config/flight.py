@@ -198,7 +198,7 @@ def overridden(
             _put(data, full_name, value)
     changed = validated(FlightConfig, data)
     fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
-    require_faults_possible(changed.faults, fitted)
+    require_faults_possible(changed.faults, fitted, changed.rates.gps_hz)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed, fitted
