@@ -38,7 +38,7 @@ class Family(NamedTuple):
 
 FAMILIES: Final = (
     Family(
-        "sensor", sensors.CHANNELS, sensors.kinds_of, sensors.defaults_of, lambda channel, _: sensors.unit_of(channel),
+        "sensor", sensors.CHANNELS, sensors.kinds_of, sensors.defaults_of, sensors.unit_of,
         sensors.wrong_values,
     ),
     Family(

@@ -64,7 +64,7 @@ class Suite:
         release_s: float = 0.0,
     ) -> None:  # fmt: skip
         for fault in faults:
-            require_possible(fault, params)
+            require_possible(fault, params, rates.gps_hz)
         for what in ("magnetometer", "airspeed", "barometer"):
             part = getattr(params, what)
             if part is not None:

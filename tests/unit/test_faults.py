@@ -163,7 +163,17 @@ def test_parse_fault_of_what_people_type(text, fault):
         ("gps.x:jump@3", "did you mean gps"),
         ("gyro:stick@3", "did you mean stuck"),
         ("gyro:jump@3", "gyro has no fault 'jump'"),
-        ("gps:bias@3", "choose from frozen_course, jump, nan, outage, spikes, stuck"),
+        (
+            "gps:bias@3",
+            "choose from drift, frozen_course, frozen_position, frozen_velocity, jump, nan, outage, rate, spikes, "
+            "stuck, whole_degrees",
+        ),
+        ("gps:rate=0@3", "must be at least 0.1 Hz; for no fixes use outage"),
+        ("gps:rate=-2@3", "must be at least 0.1 Hz"),
+        ("gps:drift=0,-200@3", "must be at most 100 m/s north and east"),
+        ("gps:drift=nan@3", "'nan' is not a number"),
+        ("gps:frozen_velocity=3@3", "takes no value"),
+        ("gps:frozen@3", "did you mean"),
         ("mag.x:dropout@3", "magnetometer.x has no fault 'dropout'"),
         ("gyro:stuck=3@3", "takes no value"),
         ("gyro:bias=1,2@3", "at most 1 value"),
@@ -214,9 +224,12 @@ def test_text_of_any_fault_reads_back_as_the_fault(data):
     kind = data.draw(st.sampled_from(family_of(channel).kinds_of(channel)))
     finite = st.floats(-1e9, -1e-12) | st.just(0.0) | st.floats(1e-12, 1e9)
     takes = {"spikes": [finite, st.floats(1e-6, 1.0)], "bias": [finite], "gain": [finite], "jump": [finite, finite]}
-    takes |= {"slow": [st.floats(1e-6, 100.0)], "slack": [st.floats(0.0, 2.0)], "weak": [st.floats(0.0, 1.0)]}
+    fraction = st.just(0.0) | st.floats(1e-6, 1.0)
+    takes |= {"slow": [st.floats(1e-6, 100.0)], "slack": [fraction], "weak": [fraction]}
     if family_of(channel).name == "actuator" and kind == "stuck":
-        takes = {"stuck": data.draw(st.sampled_from([[], [st.floats(0.0, 1.0)]]))}
+        takes = {"stuck": data.draw(st.sampled_from([[], [fraction]]))}
+    small = st.just(0.0) | st.floats(1e-12, 100.0)
+    takes |= {"rate": [st.floats(0.1, 1e3)], "drift": [small, small]}
     values = tuple(data.draw(numbers) for numbers in takes.get(kind, []))
     from_s = data.draw(st.floats(-100.0, 100.0))
     fault = Fault(channel, kind, values, from_s, from_s + data.draw(st.floats(0.01, 1e3) | st.just(math.inf)))
@@ -251,6 +264,9 @@ def test_fault_of_what_there_is_not_is_refused(arguments, words):
             "gentle_lady has no aileron; it has elevator, rudder",
         ),
         ({"faults": ["motor:dead@3"], "aircraft": "gentle_lady"}, "gentle_lady has no motor; it has elevator, rudder"),
+        ({"faults": ["gps:rate=3@3"]}, "must divide the 4 Hz of the receiver: choose 4, 2, 1.33333, 1, 0.8 Hz or"),
+        ({"faults": ["gps:rate=4@3"], "rates.gps_hz": 10}, "must divide the 10 Hz of the receiver"),
+        ({"faults": ["gps:rate=2@3"], "suite": "devboard_red"}, "must divide the 1 Hz of the receiver"),
         ({"faults": 7}, "faults = 7: write channel:kind"),
         ({"fault": "gyro:bias@3"}, "did you mean faults"),
     ],

@@ -75,14 +75,16 @@ def _is_met(fault: Fault, held_s: float, duration_s: float) -> bool:
     return fault.from_s < duration_s and fault.to_s > -held_s
 
 
-def require_faults_possible(faults: Sequence[str], suite: Any, aircraft: str, flies: bool) -> None:
-    """ValueError for a fault of a sensor that `suite` does not have, or of a control that `aircraft` does not have.
+def require_faults_possible(
+    faults: Sequence[str], suite: Any, gps_hz: float | None, aircraft: str, flies: bool
+) -> None:
+    """ValueError for a fault that the sensors of `suite` or the controls of `aircraft` cannot have.
 
-    flies : whether it is not on a table
+    gps_hz : None for the receiver's own rate       flies : whether it is not on a table
     """
     for fault in map(parse_fault, faults):
         if fault.family == "sensor":
-            require_possible(fault, suite)
+            require_possible(fault, suite, gps_hz)
         elif fault.family == "actuator" and not flies:
             raise ValueError(f"fault {fault}: the flight is on a table, where no control moves; choose one that flies")
         elif fault.family == "actuator":

@@ -199,7 +199,7 @@ def overridden(
     changed = validated(FlightConfig, data)
     fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
     flies = not isinstance(changed.start, BenchStart)
-    require_faults_possible(changed.faults, fitted, changed.aircraft, flies)
+    require_faults_possible(changed.faults, fitted, changed.rates.gps_hz, changed.aircraft, flies)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed, fitted
