@@ -1,10 +1,10 @@
 """The launch place, and the ground around it.
 
-The launch point is the origin of the local north-east-down frame `e`.  The simulated world is flat in this sense: north,
-east and down are the local ones wherever the aeroplane is, and the position `p_e_m` is the integral of the velocity
-`v_e_m_s`, so that ``dp_e / dt = v_e`` at any distance, and minus down is the height above the ellipsoid less that of the
-launch point.  `Place.geodetic` and `Place.local` convert to latitude and longitude and back by the metres per degree at
-the launch point, as users of a receiver do.  Gravity, the earth's rate and its field are those of the launch point.
+The launch point is the origin of the frame `e`, whose axes north, east and down are the local ones wherever the
+aeroplane is. The position `p_e_m` is the integral of the velocity `v_e_m_s`: ``dp_e / dt = v_e`` at any distance, and
+minus down is the height above the ellipsoid less that of the launch point. `Place.geodetic` and `Place.local` convert
+to latitude and longitude and back by the metres per degree at the launch point, as users of a receiver do. Gravity,
+the earth's rate and its magnetic field are those of the launch point.
 
 The simulated sea is the WGS 84 ellipsoid: heights above both are equal.
 """

@@ -17,6 +17,7 @@ from typing import Final
 
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
+from estimator.instruments import DEEPEST_M, HIGHEST_M
 from estimator.interface import G_M_S2
 
 PRESSURE_PA: Final = 101325.0  # at sea level
@@ -25,14 +26,13 @@ DENSITY_KG_M3: Final = 1.225
 LAPSE_K_M: Final = 0.0065
 GAS_CONSTANT_J_KG_K: Final = 287.05287
 EXPONENT: Final = G_M_S2 / (GAS_CONSTANT_J_KG_K * LAPSE_K_M)  # of the pressure, 5.2559
-DEEPEST_M, HIGHEST_M = -500.0, 9000.0  # heights above the sea for which a density is given
 MOST_HEIGHT_M: Final = 5000.0  # above the launch place; more is a broken sensor
 
 
 @kernel
 def density_ratio(height_m):  # type: ignore[no-untyped-def]
     """Density of the standard atmosphere at a height above the sea, over that at sea level."""
-    return (1.0 - LAPSE_K_M * clip(height_m, DEEPEST_M, HIGHEST_M) / TEMPERATURE_K) ** (EXPONENT - 1.0)
+    return (1.0 - LAPSE_K_M * clip(height_m, DEEPEST_M, HIGHEST_M + MOST_HEIGHT_M) / TEMPERATURE_K) ** (EXPONENT - 1.0)
 
 
 @kernel

@@ -82,10 +82,11 @@ class Prepared:
             return _unflown(str(self.script), rates, self.heading_reference, manifest)
         plant, faults = build_plant(config, rates), [parse_fault(fault) for fault in config.faults]
         airborne = isinstance(config.start, InFlightStart)
-        on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight) if airborne else None
+        place = config.place.build()
+        on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight, place) if airborne else None
         flown = fly(
             plant,
-            Suite(self.suite, rates, config.seed, config.flight, of_family("sensor", faults), plant.release_s),
+            Suite(self.suite, rates, config.seed, config.flight, of_family("sensor", faults), plant.release_s, place),
             self.estimator.code,
             self.autopilot.code,
             self.script,

@@ -15,6 +15,7 @@ from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
+from scenarios.harness.config.place import PlaceConfig
 from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
 from scenarios.harness.config.validation import validated
 from scenarios.harness.plugins import Maker
@@ -97,6 +98,7 @@ class FlightConfig(_Model):
     files: dict[str, str] = Field(default_factory=dict)
     faults: tuple[str, ...] = ()
     air: AirConfig = Field(default_factory=AirConfig)
+    place: PlaceConfig = Field(default_factory=PlaceConfig)
     start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
     box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)

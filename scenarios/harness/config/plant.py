@@ -17,7 +17,8 @@ def build_plant(config: FlightConfig, rates: Rates) -> Plant:
     if isinstance(start, BenchStart):
         roll_rad, pitch_rad, heading_rad = _radians((start.roll_deg, start.pitch_deg, config.heading_deg))
         rest = Rest(roll_rad, pitch_rad, heading_rad, start.height_m)
-        return PrescribedPlant(rest, rates, release_s=start.calibration_s)
+        place = config.place
+        return PrescribedPlant(rest, rates, place.latitude_deg, start.calibration_s, place.elevation_m)
     return JsbsimPlant(
         config.aircraft,
         start=build_start(config),
@@ -26,6 +27,7 @@ def build_plant(config: FlightConfig, rates: Rates) -> Plant:
         seed=config.seed,
         flight=config.flight,
         box=FlightBox(config.box_radius_m, config.box_height_m),
+        place=config.place.build(),
     )
 
 
