@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from sim.aeroplane.jsbsim_model import Model
 
 AIRCRAFT = Path(__file__).parents[1] / "aircraft"
+PROPELLER = "propeller.xml"
 STEP_RAD = 1e-4  # of the angle of attack, for slopes
 
 
@@ -101,6 +102,11 @@ def model_folder(aircraft: str, built: AsBuilt) -> Iterator[tuple[str, str]]:
         if built.thrust_factor != 1.0:
             _weaken(copy, aircraft, built.thrust_factor)
         yield name, str(copy)
+
+
+def has_motor(aircraft: str) -> bool:
+    """Whether the aeroplane has a propeller."""
+    return (AIRCRAFT / aircraft / PROPELLER).exists()
 
 
 def drawn_inertia_kg_m2(aircraft: str) -> tuple[float, float, float]:
@@ -194,14 +200,13 @@ def _at_zero(damping: ElementTree.Element) -> float:
 
 def _weaken(folder: Path, aircraft: str, factor: float) -> None:
     """Scale the thrust coefficient of the propeller."""
-    propeller = folder / "propeller.xml"
-    if not propeller.exists():
+    if not has_motor(aircraft):
         raise ValueError(f"airframe.thrust_factor = {factor:g}: '{aircraft}' has no motor; leave it at 1")
 
     def scale(thruster: ElementTree.Element) -> None:
         ElementTree.SubElement(thruster, "ct_factor").text = repr(factor)
 
-    _rewrite(propeller, scale)
+    _rewrite(folder / PROPELLER, scale)
 
 
 def _rewrite(path: Path, change: Callable[[ElementTree.Element], None]) -> None:

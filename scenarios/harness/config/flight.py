@@ -223,6 +223,11 @@ class FlightConfig(_Model):
         return heading_deg
 
     @property
+    def flies(self) -> bool:
+        """Whether it leaves the table."""
+        return not isinstance(self.start, BenchStart)
+
+    @property
     def held_s(self) -> float:
         """Time from power-up to the release; on a table, to the end of the calibration."""
         match self.start:
@@ -376,7 +381,9 @@ def resolve(config: FlightConfig, suite: SuiteParams | None = None) -> FlightCon
     start = _resolve_start(config)
     air = resolve_air(config.air, start.heading_deg, config.seed, config.flight)
     files, rates = config.files or own_files(config.suite), _resolve_rates(config, suite)
-    airframe = resolve_airframe(config.airframe, config.tolerances, config.aircraft, config.seed, config.flight)
+    airframe = resolve_airframe(
+        config.airframe, config.tolerances, config.aircraft, config.flies, config.seed, config.flight
+    )
     return config.model_copy(update={"start": start, "air": air, "airframe": airframe, "files": files, "rates": rates})
 
 

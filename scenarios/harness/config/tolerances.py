@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from sim.aeroplane.built import AsBuilt, drawn_inertia_kg_m2, require_flyable
+from sim.aeroplane.built import AS_DRAWN, AsBuilt, drawn_inertia_kg_m2, has_motor, require_flyable
 from sim.rng import stream
 
 MOST_SIGMA = 2.0  # beyond which nothing is drawn: a builder would have noticed
@@ -52,12 +52,13 @@ class AirframeConfig(_Model):
 class TolerancesConfig(_Model):
     """Standard deviations of the differences from the drawing; 0, the default, is built as drawn.
 
-    Each difference is normally distributed, up to two standard deviations, and has its own random stream.
+    Each difference is normally distributed, up to two standard deviations, and has its own random stream.  What an
+    aeroplane does not have is not drawn, and on a table nothing is.
 
     mass : of the mass, 0.05 is 5 %         cg : of the centre of gravity along the fuselage, of the mean chord
     inertia : of the spread of the mass along each of the three axes, which makes the moments of inertia
     trim : of the neutral position of each surface, of its full deflection
-    thrust : of the thrust                  warp_deg : of the twist between the halves of the wing
+    thrust : of the thrust of the motor     warp_deg : of the twist between the halves of the wing
     """
 
     mass: float = Field(default=0.0, ge=0.0, le=0.3)
@@ -74,12 +75,12 @@ class TolerancesConfig(_Model):
 
 
 def resolve_airframe(
-    airframe: AirframeConfig, tolerances: TolerancesConfig, aircraft: str, seed: int, flight: int
+    airframe: AirframeConfig, tolerances: TolerancesConfig, aircraft: str, flies: bool, seed: int, flight: int
 ) -> AirframeConfig:
     """`airframe` in plain numbers: differences that are left to chance are drawn, each from its own stream."""
 
     def drawn(name: str, sigma: float) -> float:
-        return sigma * _normal(stream(seed, flight, f"airframe_{name}")) if sigma else 0.0
+        return sigma * _normal(stream(seed, flight, f"airframe_{name}")) if sigma and flies else 0.0
 
     t = tolerances
     roll, pitch, yaw = _inertia_factors(aircraft, [drawn(f"inertia_{axis}", t.inertia) for axis in "xyz"])
@@ -90,7 +91,7 @@ def resolve_airframe(
         "pitch_inertia_factor": pitch,
         "yaw_inertia_factor": yaw,
         **{f"{surface}_trim": drawn(f"{surface}_trim", t.trim) for surface in ("aileron", "elevator", "rudder")},
-        "thrust_factor": 1.0 + drawn("thrust", t.thrust),
+        "thrust_factor": 1.0 + (drawn("thrust", t.thrust) if has_motor(aircraft) else 0.0),
         "warp_deg": drawn("warp", t.warp_deg),
     }
     left = {name: value for name, value in values.items() if getattr(airframe, name) == "random"}
@@ -105,12 +106,14 @@ def built(airframe: AirframeConfig) -> AsBuilt:
     return AsBuilt(**values)
 
 
-def require_sound(airframe: AirframeConfig, aircraft: str, physics_hz: int) -> None:
-    """ValueError in one line if the aeroplane of a resolved configuration cannot fly."""
+def require_sound(airframe: AirframeConfig, aircraft: str, physics_hz: int, flies: bool) -> None:
+    """ValueError in one line if the aeroplane of a resolved configuration cannot fly, or does not leave its table."""
     from sim.aeroplane.jsbsim_model import Model  # takes long to load, and is needed here only for a difference
 
     as_built = built(airframe)
-    if as_built != AsBuilt():
+    if as_built != AS_DRAWN:
+        if not flies:
+            raise ValueError("airframe: the flight is on a table, where it changes nothing; leave it as it is")
         require_flyable(Model(aircraft, physics_hz, as_built))
 
 
