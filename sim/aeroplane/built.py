@@ -18,6 +18,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -81,26 +82,25 @@ AS_DRAWN = AsBuilt()
 
 
 @contextmanager
-def model_folder(aircraft: str, built: AsBuilt) -> Iterator[tuple[str, str]]:
-    """Folders from which JSBSim loads the model and its engine; copies last only as long as the block.
+def model_folder(own: Path, built: AsBuilt) -> Iterator[tuple[str, str]]:
+    """Folders from which JSBSim loads the model of the folder `own`, and its engine; copies last as long as the block.
 
     Raises
     ------
     ValueError      no body has such moments of inertia, or a thrust of an aeroplane without a motor
     OSError         the copy cannot be written
     """
-    own = AIRCRAFT / aircraft
     if built.as_modelled:
-        yield str(AIRCRAFT), str(own)
+        yield str(own.parent), str(own)
         return
     with tempfile.TemporaryDirectory(prefix="wingslevel-") as name:
-        copy = Path(name) / aircraft
+        copy = Path(name) / own.name
         copy.mkdir()
         for part in own.glob("*.xml"):
             shutil.copyfile(part, copy / part.name)
-        _rewrite(copy / f"{aircraft}.xml", lambda model: _change(model, built))
+        _rewrite(copy / f"{own.name}.xml", lambda model: _change(model, built))
         if built.thrust_factor != 1.0:
-            _weaken(copy, aircraft, built.thrust_factor)
+            _weaken(copy, built.thrust_factor)
         yield name, str(copy)
 
 
@@ -109,6 +109,7 @@ def has_motor(aircraft: str) -> bool:
     return (AIRCRAFT / aircraft / PROPELLER).exists()
 
 
+@cache
 def drawn_inertia_kg_m2(aircraft: str) -> tuple[float, float, float]:
     """Moments of inertia about x, y and z of the drawn aeroplane."""
     masses = _found(ElementTree.parse(AIRCRAFT / aircraft / f"{aircraft}.xml").getroot(), "mass_balance")
@@ -198,10 +199,10 @@ def _at_zero(damping: ElementTree.Element) -> float:
     return next(float(row[1]) for row in rows[1:] if float(row[0]) == 0.0)
 
 
-def _weaken(folder: Path, aircraft: str, factor: float) -> None:
+def _weaken(folder: Path, factor: float) -> None:
     """Scale the thrust coefficient of the propeller."""
-    if not has_motor(aircraft):
-        raise ValueError(f"airframe.thrust_factor = {factor:g}: '{aircraft}' has no motor; leave it at 1")
+    if not (folder / PROPELLER).exists():
+        raise ValueError(f"airframe.thrust_factor = {factor:g}: '{folder.name}' has no motor; leave it at 1")
 
     def scale(thruster: ElementTree.Element) -> None:
         ElementTree.SubElement(thruster, "ct_factor").text = repr(factor)

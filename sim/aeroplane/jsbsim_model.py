@@ -60,7 +60,7 @@ class Model:
         jsbsim.set_logger(_SILENT)  # for each model: JSBSim keeps a logger per thread
         self.fdm = jsbsim.FGFDMExec(str(self.folder))  # not its own data, absent in some installations
         self.fdm.set_dt(self.dt_s)  # before loading, which computes the servo lags
-        with model_folder(aircraft, built) as (models, engine):
+        with model_folder(self.folder, built) as (models, engine):
             if not self.fdm.load_model_with_paths(aircraft, models, engine, str(self.folder)):
                 raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")
         self.run = self.fdm.run
@@ -115,10 +115,13 @@ class Model:
         return LB_TO_N * float(self.get("propulsion/engine/thrust-lbs")[0]) if self.powered else 0.0
 
     def inertia_tensor_kg_m2(self) -> Array:
-        """Inertia about the centre of gravity, body axes, shape (3, 3), off-diagonal elements negated products."""
+        """Inertia about the centre of gravity, body axes, shape (3, 3), off-diagonal elements negated products.
+
+        JSBSim's properties are the elements: ``inertia/ixz-slugs_ft2`` is the negated product.
+        """
         names = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
         xx, yy, zz, xy, yz, xz = SLUGFT2_TO_KGM2 * self.get(*(f"inertia/{name}-slugs_ft2" for name in names))
-        return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     def wing(self) -> tuple[float, float, float]:
         """Reference quantities of the coefficients: area [m2], span and mean chord [m]."""
