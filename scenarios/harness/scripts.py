@@ -30,3 +30,13 @@ def turning(config: FlightConfig) -> Script:
 def launch(config: FlightConfig) -> Script:
     """A hand launch, then a climb to ``height_m``."""
     return Script([Timed(0.0, Setpoint(Mode.LAUNCH, height_m=config.manoeuvre["height_m"]))])
+
+
+def loiter(config: FlightConfig) -> Script:
+    """A circle to the right about the point ``north_m``, ``east_m``, of ``radius_m``, at ``height_m``.
+
+    The centre is the launch point if it is not given; ``left`` not zero circles to the left.
+    """
+    m = config.manoeuvre
+    circle = Setpoint(Mode.LOITER, height_m=m["height_m"], radius_m=m["radius_m"], left=bool(m.get("left", 0.0)))
+    return Script([Timed(0.0, replace(circle, north_m=m.get("north_m", 0.0), east_m=m.get("east_m", 0.0)))])
