@@ -40,7 +40,8 @@ def metres_per_degree(latitude_deg: float = LATITUDE_DEG, height_m: float = 0.0)
     latitude_rad = math.radians(latitude_deg)
     w2 = 1.0 - ECCENTRICITY2 * math.sin(latitude_rad) ** 2
     meridian_m, normal_m = MAJOR_AXIS_M * (1.0 - ECCENTRICITY2) / w2**1.5, MAJOR_AXIS_M / math.sqrt(w2)
-    return math.radians(meridian_m + height_m), math.radians((normal_m + height_m) * math.cos(latitude_rad))
+    around_m = (normal_m + height_m) * math.cos(latitude_rad)
+    return math.radians(meridian_m + height_m), max(math.radians(around_m), 1.0)  # at the poles a degree has no length
 
 
 @dataclass(frozen=True, slots=True)

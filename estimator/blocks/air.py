@@ -22,9 +22,9 @@ from estimator.interface import G_M_S2
 
 PRESSURE_PA: Final = 101325.0  # at sea level
 TEMPERATURE_K: Final = 288.15
-DENSITY_KG_M3: Final = 1.225
 LAPSE_K_M: Final = 0.0065
 GAS_CONSTANT_J_KG_K: Final = 287.05287
+DENSITY_KG_M3: Final = PRESSURE_PA / (GAS_CONSTANT_J_KG_K * TEMPERATURE_K)  # 1.225
 EXPONENT: Final = G_M_S2 / (GAS_CONSTANT_J_KG_K * LAPSE_K_M)  # of the pressure, 5.2559
 MOST_HEIGHT_M: Final = 5000.0  # above the launch place; more is a broken sensor
 

@@ -16,7 +16,8 @@ from estimator.blocks.air import true_over_equivalent
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.aeroplane import hand
-from sim.aeroplane.jsbsim_model import FT_TO_M, LB_TO_N, WIND, WRITE, Model
+from sim.aeroplane.built import AS_DRAWN, AsBuilt
+from sim.aeroplane.jsbsim_model import FT_TO_M, LB_TO_N, WIND, Model
 from sim.aeroplane.trim import Trim, trim
 from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
@@ -154,6 +155,7 @@ class JsbsimPlant:
     seed, flight : of the random streams (used here only by turbulence)
     box : limits of the flight; a start outside is rejected
     place : launch place, and the ground around it
+    built : how the aeroplane differs from its drawing
 
     Raises ValueError for an unknown aircraft or an impossible start.
     """
@@ -161,12 +163,13 @@ class JsbsimPlant:
     def __init__(
         self, aircraft: str = "endurance", *, start: Start, air: Air = STILL, rates: Rates | None = None,
         seed: int = 0, flight: int = 0, box: FlightBox | None = None, place: Place = LAUNCH_PLACE,
+        built: AsBuilt = AS_DRAWN,
     ) -> None:  # fmt: skip
         rates = rates or Rates()
         box = box or FlightBox()
         self.start, self.air = start, air
         self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
-        self._physics_hz, self._aircraft, self.place = rates.physics_hz, aircraft, place
+        self._physics_hz, self._aircraft, self._built, self.place = rates.physics_hz, aircraft, built, place
         self._hold_ticks = self._release_tick = self._hand_ticks = 0
         if isinstance(start, HandThrow):
             hand.check(start)
@@ -205,9 +208,9 @@ class JsbsimPlant:
 
     def _load(self) -> None:
         """A new JSBSim for each flight: a diverged state survives any reset."""
-        self.model = Model(self._aircraft, self._physics_hz, self.place)
+        self.model = Model(self._aircraft, self._physics_hz, self._built, self.place)
         self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
-        self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._aileron, self._elevator, self._rudder, self._throttle = self.model.servo_setters()
         self._wind = tuple(self.model.setter(p) for p in WIND)
         self._air_rates = tuple(self.model.setter(p) for p in AIR_RATES if self.model.has(p))
         self._terrain = self.model.setter("position/terrain-elevation-asl-ft")

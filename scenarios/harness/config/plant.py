@@ -5,6 +5,7 @@ import math
 from scenarios.harness.config.air import build_air
 from scenarios.harness.config.flight import FlightConfig
 from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStart
+from scenarios.harness.config.tolerances import built
 from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.clock import Rates
 from sim.motion.prescribed_plant import PrescribedPlant, Rest
@@ -28,6 +29,7 @@ def build_plant(config: FlightConfig, rates: Rates) -> Plant:
         flight=config.flight,
         box=FlightBox(config.box_radius_m, config.box_height_m),
         place=config.place.build(),
+        built=built(config.airframe),
     )
 
 
