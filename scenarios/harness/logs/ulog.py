@@ -277,13 +277,13 @@ def _airspeed(log: _Log) -> Stream | None:
     name, topic = found
     t_s = _published_s(topic)
     fields = [f for f in ("calibrated_airspeed_m_s", "indicated_airspeed_m_s") if f in topic]
-    values = np.full(len(t_s), np.nan)
+    values = np.full((len(t_s), 1), np.nan)
     for field in fields:
         values = np.where(np.isfinite(values), values, log.columns(name, topic, field))
     missing = ~np.isfinite(values)
     if not fields or (missing.any() and "true_airspeed_m_s" in topic):
-        true = log.columns(name, topic, "true_airspeed_m_s")
-        values = np.where(missing, _equivalent(log, t_s, true), values)
+        true = np.where(missing, log.columns(name, topic, "true_airspeed_m_s"), np.nan)
+        values = np.where(missing, _equivalent(log, t_s, true[:, 0])[:, None], values)
     stream = Stream.of(name, t_s, values)
     if name != "airspeed_validated":
         confidence = topic.get("confidence", np.zeros(0))
@@ -299,7 +299,7 @@ def _equivalent(log: _Log, t_s: Array, true_m_s: Array) -> Array:
     if not np.isfinite(true_m_s).any():
         return true_m_s
     if (found := log.first("vehicle_air_data")) is not None:
-        at_s, height_m = _published_s(found[1]), log.columns(*found, "baro_alt_meter")
+        at_s, height_m = _published_s(found[1]), log.columns(*found, "baro_alt_meter")[:, 0]
     else:
         fixes, _ = _fixes(log)
         at_s, height_m = (np.zeros(0), np.zeros(0)) if fixes is None else (fixes.t_s, fixes.values[:, 2])
