@@ -212,10 +212,13 @@ def least_airspeed(s, e):  # type: ignore[no-untyped-def]
 
 @kernel
 def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
-    """The airspeed, m/s, or else that from the elevator (`autopilot.lift`); infinite if neither is known."""
-    if s.airspeed_known:
-        return s.airspeed_m_s
-    return s.lift_m_s if math.isfinite(s.lift_m_s) else math.inf
+    """The airspeed of the guards against a stall, m/s; infinite if unknown.
+
+    Measured, or from the elevator (`autopilot.lift`), or from the estimated wind, which is late and may be wrong.
+    """
+    if math.isfinite(s.lift_m_s) and not (s.airspeed_known and s.air_left_s > 0.0):
+        return s.lift_m_s
+    return s.airspeed_m_s if s.airspeed_known else math.inf
 
 
 @kernel

@@ -1,7 +1,8 @@
 """Airspeed from the elevator: protects the speed when the motor gives less than the throttle asks.
 
-Without a pitot tube or an estimated wind nothing measures the airspeed.  An aeroplane that is stable in pitch needs more
-up-elevator the slower it flies: the angle of attack is proportional to it, apart from what the pitch rate q takes,
+Without a pitot tube nothing measures the airspeed, and that from an estimated wind is late.  An aeroplane that is stable
+in pitch needs more up-elevator the slower it flies: the angle of attack is proportional to it, apart from what the pitch
+rate q takes,
 
     a - a_c = i (e - d q V_c / V)
 
@@ -9,9 +10,9 @@ and a wing at the angle of attack a carries n times the weight at the speed
 
     V = V_c sqrt(n / (1 + (a - a_c) / k))
 
-with V_c and a_c of cruise and k the angle of attack per lift coefficient relative to cruise (`pitch_per_lift_rad`).  The
-load n comes from the accelerometer.  No attitude is used: when the motor stops, an estimator without airspeed takes the
-deceleration for a lowered nose.
+with V_c and a_c of cruise and k the angle of attack per lift coefficient relative to cruise (`pitch_per_lift_rad`).
+The load n comes from the accelerometer.  No attitude is used: when the motor stops, an estimator without airspeed takes
+the deceleration for a lowered nose.
 
 The elevator also has the errors of the trim, so that this airspeed is too rough to be held; it only limits the climb
 demand near the stall (`autopilot.energy`).  `tests/physics` compares it with the trimmed model.

@@ -76,7 +76,8 @@ class Prepared:
 
         The manifest also holds ``on_ground``, the mean inertial sample from before a flight that starts in the air,
         if there is one; ``known_to_estimator``, what the estimator was given of the instruments or has learnt;
-        ``battery``, what was drawn from it, if it is simulated; and ``scenario_fault``, what went wrong in the scenario's own functions.
+        ``battery``, what was drawn from it, if it is simulated; and ``scenario_fault``, what went wrong in the
+        scenario's own functions.
         """
         config, rates, manifest = self.config, self.rates, self.manifest
         if isinstance(self.script, ScriptFailed):
