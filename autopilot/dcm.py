@@ -81,7 +81,7 @@ _STATE = np.dtype(
         ("inverted", "i8"),  # flying inverted
         ("airspeed_m_s", "f8"),  # best knowledge
         ("airspeed_known", "i8"),  # measured, or from GPS and wind
-        ("lift_m_s", "f8"),  # airspeed from the elevator, NaN if unknown
+        ("lift_m_s", "f8"),  # airspeed from the elevator, 0 if unknown
         ("elevator", "f8"),  # last command
         ("air_left_s", "f8"),  # remaining time for which the last measured airspeed is used
         ("airspeed_wanted_m_s", "f8"),
@@ -334,7 +334,6 @@ class DcmAutopilot:
         for group in _GROUPS:
             me["p"][group] = astuple(getattr(self.params, group))
         me["s"]["mode"] = me["s"]["setpoint_mode"] = me["s"]["led_by"] = me["s"]["thrown_s"] = -1
-        me["s"]["lift_m_s"] = math.nan
         me["s"]["believed"], me["s"]["heard_s"], me["s"]["R_kept_eb"] = 1, math.inf, np.eye(3)
         me["on_nose"] = self.heading_reference == "nose"
         self._setpoint: Setpoint | None = None

@@ -1,8 +1,8 @@
 """Airspeed from the elevator: protects the speed when the motor gives less than the throttle asks.
 
-Without a pitot tube nothing measures the airspeed, and that from an estimated wind is late.  An aeroplane that is stable
-in pitch needs more up-elevator the slower it flies: the angle of attack is proportional to it, apart from what the pitch
-rate q takes,
+Without a pitot tube nothing measures the airspeed, and that from an estimated wind is late.  An aeroplane that is
+stable in pitch needs more up-elevator the slower it flies: the angle of attack is proportional to it, apart from what
+the pitch rate q takes,
 
     a - a_c = i (e - d q V_c / V)
 
@@ -47,7 +47,7 @@ class LiftParams:
 
 @kernel
 def feel_lift(row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Update the airspeed from the elevator, m/s, `s.lift_m_s`, NaN if unknown; call once per tick.
+    """Update the airspeed from the elevator, m/s, `s.lift_m_s`, 0 if unknown; call once per tick.
 
     row : measured   s : record with `elevator`, the last command, the mode, and `lift_m_s`, updated
     p : record of AutopilotParams
@@ -56,9 +56,9 @@ def feel_lift(row, s, p, dt_s):  # type: ignore[no-untyped-def]
     down_m_s2, pitching_rad_s = row.force_b_m_s2[2], row.gyro_b_rad_s[1]
     being_thrown = s.mode == LAUNCH and s.thrown_s < p.launch.full_throttle_s
     if s.inverted or being_thrown or lift.incidence_per_elevator_rad <= 0.0:
-        s.lift_m_s = math.nan
+        s.lift_m_s = 0.0
     elif abs(down_m_s2) <= FORCE_RANGE_M_S2 and abs(pitching_rad_s) <= GYRO_RANGE_RAD_S:  # else a bad sample
-        if not math.isfinite(s.lift_m_s):
+        if s.lift_m_s <= 0.0:
             s.lift_m_s = e.airspeed_m_s
         elevator = s.elevator - lift.elevator_per_rate_s * pitching_rad_s * e.airspeed_m_s / s.lift_m_s
         coefficient = 1.0 + lift.incidence_per_elevator_rad * elevator / e.pitch_per_lift_rad

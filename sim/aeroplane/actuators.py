@@ -99,17 +99,20 @@ class _Acting:
         self.jams = fault.kind == "stuck" and not fault.values
         self.place = math.nan
 
-    def apply(self, wanted: float, position: float) -> float:
-        """The command that arrives in place of `wanted`; `position` is where the servo is."""
+    def apply(self, wanted: float, position: float, trim: float) -> float:
+        """The command that arrives in place of `wanted`.
+
+        position : where the servo is, as the command that holds it there   trim : deflection at neutral command
+        """
         kind = self.kind
         if kind in ("lost", "dead"):
-            return 0.0
+            return -trim
         if kind == "reversed":
             return -wanted
         if kind == "weak":
             return self.value * wanted
         if kind == "stuck":
-            return position if self.jams else self.value
+            return position if self.jams else self.value - trim
         near = self.step if kind == "slow" else 0.5 * self.value
         place = position if math.isnan(self.place) else self.place
         self.place = slew(place, wanted, near) if kind == "slow" else play(place, wanted, near)
@@ -146,6 +149,7 @@ class Actuators:
             require_control(str(fault), fault.channel, aircraft)
         self._faults = [_Acting(fault, release_s, dt_s) for fault in faults]
         self._places = [model.getter(name) for name in PLACES]
+        self._trims = (*model.built.trims, 0.0)
         self._jam = {
             CHANNELS.index(name): model.setter(f"fcs/{SERVO.get(name, name + '-servo')}/malfunction/fail_stuck")
             for name in controls_of(aircraft)
@@ -164,7 +168,7 @@ class Actuators:
         for fault in self._faults:
             if fault.first <= k < fault.end:
                 i = fault.channel
-                arriving[i] = fault.apply(arriving[i], places[i])
+                arriving[i] = fault.apply(arriving[i], places[i] - self._trims[i], self._trims[i])
                 jammed[i] = jammed[i] or fault.jams
         if jammed != self._jammed:
             for i, write in self._jam.items():

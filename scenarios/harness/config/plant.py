@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from scenarios.harness.config.air import build_air
 from scenarios.harness.config.flight import FlightConfig
 from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStart
+from scenarios.harness.config.tolerances import built
 from sim.aeroplane.battery import Battery
 from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.clock import Rates
@@ -31,6 +32,7 @@ def build_plant(config: FlightConfig, rates: Rates, faults: Sequence[Fault] = ()
         box=FlightBox(config.box_radius_m, config.box_height_m),
         faults=of_family("actuator", faults),
         battery=config.battery.build(),
+        built=built(config.airframe),
     )
 
 
