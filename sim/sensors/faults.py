@@ -18,9 +18,7 @@ as the part does.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from decimal import Decimal
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +33,8 @@ from sim.sensors.fault_kinds import Kind
 from sim.sensors.gps_faults import BY_AXIS, DEFAULTS, OF_FIXES, UNITS, spoil_fix, why_impossible, why_no_such_rate
 from sim.sensors.noise import Source
 
-LATEST_S: Final = 36000.0
+if TYPE_CHECKING:
+    from sim.faults import Fault
 
 
 class _Part(NamedTuple):
@@ -76,7 +75,11 @@ def kinds_of(channel: str) -> tuple[str, ...]:
 
 
 def defaults_of(channel: str, kind: str) -> tuple[float, ...]:
-    """Default values of a fault, as many as it takes."""
+    """Default values of a fault, as many as it takes, in deg/s, g, uT, m/s, m or Hz.
+
+    spikes: amplitude, fraction of the readings; bias: amount; gain: factor; saturated: +1 or -1; jump and drift:
+    north, east; rate
+    """
     part = _PARTS[channel.partition(".")[0]]
     values = {"spikes": part.spikes, "bias": (part.bias,), "gain": (0.5,), "saturated": (1.0,), **DEFAULTS}
     return values.get(kind, ())
@@ -87,79 +90,16 @@ def unit_of(channel: str, kind: str = "") -> str:
     return UNITS.get(kind, _PARTS[channel.partition(".")[0]].unit)
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """One fault.  Its text ``channel:kind=values@from-to``, as typed by users, also names its random stream.
-
-    channel : one of CHANNELS                       kind : one of `kinds_of` the channel
-    values : spikes: amplitude, fraction of the readings; bias: amount; gain: factor; saturated: +1 or -1; jump
-        and drift: north, east; rate.  In deg/s, g, uT, m/s, m or Hz; `defaults_of` fills in missing ones
-    from_s, to_s : since the release; affects readings at from_s <= t < to_s, to the end if to_s is infinite
-    """
-
-    channel: str
-    kind: str
-    values: tuple[float, ...] = ()
-    from_s: float = -LATEST_S
-    to_s: float = math.inf
-
-    def __post_init__(self) -> None:
-        if self.channel not in CHANNELS:
-            raise ValueError(f"fault of {self.channel!r}: choose from {', '.join(CHANNELS)}")
-        if self.kind not in kinds_of(self.channel):
-            raise ValueError(f"fault of {self.channel}: {self.kind!r}: choose from {', '.join(kinds_of(self.channel))}")
-        given = tuple(float(value) for value in self.values)
-        defaults = defaults_of(self.channel, self.kind)
-        if len(given) > len(defaults):
-            takes = f"at most {len(defaults)} values" if defaults else "no value"
-            raise ValueError(f"{self.what} = {_numbers(given)}: takes {takes}")
-        object.__setattr__(self, "values", given + defaults[len(given) :])
-        self._check_values()
-        if not (abs(self.from_s) <= LATEST_S and self.from_s < self.to_s and self.to_s > -LATEST_S):
-            raise ValueError(
-                f"{self.what} from {self.from_s!r} to {self.to_s!r} s: must begin within {LATEST_S:g} s of the release "
-                "and end later than it begins"
-            )
-
-    def _check_values(self) -> None:
-        shown = f"{self.what} = {_numbers(self.values)}"
-        if not all(math.isfinite(value) for value in self.values):
-            raise ValueError(f"{shown}: must be finite, in {unit_of(self.channel, self.kind)}")
-        if self.kind == "saturated" and abs(self.values[0]) != 1.0:
-            raise ValueError(f"{shown}: must be 1, the upper end of the full scale, or -1, the lower")
-        if self.kind == "spikes" and not 0.0 < self.values[1] <= 1.0:
-            raise ValueError(f"{shown}: the second value is the fraction of the readings, above 0 and at most 1")
-        if why := why_impossible(self.kind, self.values):
-            raise ValueError(f"{shown}: {why}")
-
-    @property
-    def part(self) -> str:
-        """Name of the sensor in the suite."""
-        return self.channel.partition(".")[0]
-
-    @property
-    def what(self) -> str:
-        """Channel and kind."""
-        return f"{self.channel}:{self.kind}"
-
-    def __str__(self) -> str:
-        values = f"={_numbers(self.values)}" if self.values else ""
-        end = f"-{_number(self.to_s)}" if math.isfinite(self.to_s) else ""
-        return f"{self.what}{values}@{_number(self.from_s)}{end}"
+def wrong_values(_channel: str, kind: str, values: tuple[float, ...]) -> str:
+    """What would be right, if the finite values of a fault are not."""
+    if kind == "saturated" and abs(values[0]) != 1.0:
+        return "must be 1, the upper end of the full scale, or -1, the lower"
+    if kind == "spikes" and not 0.0 < values[1] <= 1.0:
+        return "the second value is the fraction of the readings, above 0 and at most 1"
+    return why_impossible(kind, values)
 
 
-def _number(value: float) -> str:
-    """Shortest decimal without exponent that parses to `value`."""
-    if not math.isfinite(value):
-        return str(value)
-    return format(Decimal(repr(float(value))), "f").removesuffix(".0")
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return ",".join(_number(value) for value in values)
-
-
-def require_possible(fault: Fault, suite: Any, gps_hz: float | None = None) -> None:
+def require_possible(fault: "Fault", suite: Any, gps_hz: float | None = None) -> None:
     """Reject a fault that the parts of `suite` cannot have: ValueError.
 
     gps_hz : rate of the GPS; None is the rate of the receiver
@@ -196,7 +136,7 @@ NO_FAULTS = np.zeros((0, 0), FAULT)
 
 
 def fault_table(
-    faults: Sequence[Fault], release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
+    faults: Sequence["Fault"], release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
 ) -> NDArray[np.void]:
     """Faults of each of `n` ticks, shape (n, m) of FAULT, a column per axis of each fault; or NO_FAULTS.
 
@@ -230,7 +170,7 @@ def _first_tick(t_s: float, imu_hz: float, n: int) -> int:
     return n if math.isinf(t_s) else min(max(math.ceil(t_s * imu_hz - 1e-9) - 1, 0), n)
 
 
-def _columns(fault: Fault, source: Source, n: int) -> list[tuple[Fault, int, Array]]:
+def _columns(fault: "Fault", source: Source, n: int) -> list[tuple["Fault", int, Array]]:
     """Each axis of a fault, with its SI value in each of `n` ticks."""
     part, letter = _PARTS[fault.part], fault.channel.partition(".")[2]
     axes = ["xyz".index(letter)] if letter else list(range(part.axes))
@@ -304,7 +244,7 @@ def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
             else:
                 row.mag_b_ut[i] = _wrong(row.mag_b_ut[i], before.mag_b_ut[i], fault)
         elif fault.part == _AIRSPEED:
-            row.airspeed_m_s = _wrong(row.airspeed_m_s, before.airspeed_m_s, fault)
+            row.equivalent_airspeed_m_s = _wrong(row.equivalent_airspeed_m_s, before.equivalent_airspeed_m_s, fault)
         elif fault.part == _BAROMETER:
             row.baro_height_m = _wrong(row.baro_height_m, before.baro_height_m, fault)
         elif fault.part == _GPS and row.gps_new:
