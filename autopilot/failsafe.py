@@ -271,7 +271,7 @@ def mode_in_force(setpoint, height_m, row, s, p, dt_s):  # type: ignore[no-untyp
         return GLIDE, GLIDE
     guarded = navigates or mode == STABILISE or (mode == LAUNCH and height_m > f.safe_height_m)
     if guarded and mode != RETURN and s.heard_s >= f.gps_back_s:
-        mind_fence(row, height_m, s, p.fence, p.guidance)
+        mind_fence(row, height_m, s, p.fence, p.guidance, p.energy.airspeed_m_s)
         if s.fenced:
             mode, navigates, launched = at_fence(p.fence), True, False
     if not navigates or launched or mode == GLIDE:  # launched: wings already level, climbing

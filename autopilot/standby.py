@@ -40,10 +40,11 @@ class StandbyParams:
         and accelerations more; lower: drifts further before the offset is learnt
     tilt_offset_1_s2 : learning of the gyro offset from that error (1/s2, default 0.02).  Higher: learns faster, then
         oscillates; 0: the last offset of the estimator is kept
-    yaw_gain_1_s, yaw_offset_1_s2 : the same in yaw, from the course (1/s and 1/s2, default 0.2 and 0.015)
+    yaw_gain_1_s, yaw_offset_1_s2 : the same in yaw, from the course (1/s and 1/s2, default 0.2 and 0.015).  Higher: a
+        crab angle, which changes in gusts, counts more
     alpha_rad : angle of attack in level flight, for the pitch without an accelerometer (rad, default 1 deg).  Higher:
         flies slower then
-    offset_limit_rad_s : largest offset per axis (rad/s, default 20 deg/s).  Lower: large offsets remain
+    offset_limit_rad_s : largest offset per axis (rad/s, default 0.35).  Lower: large offsets remain
     """
 
     tilt_gain_1_s: float = 0.3
@@ -51,7 +52,7 @@ class StandbyParams:
     yaw_gain_1_s: float = 0.2
     yaw_offset_1_s2: float = 0.015
     alpha_rad: float = math.radians(1.0)
-    offset_limit_rad_s: float = math.radians(20.0)
+    offset_limit_rad_s: float = 0.35
 
 
 @kernel
