@@ -215,7 +215,8 @@ def on_standby(setpoint, s, p, dt_s):  # type: ignore[no-untyped-def]
     no_gps = s.heard_s < p.gps_back_s or not s.fixed
     s.helped_s = 0.0 if no_gps or not setpoint.radio else s.helped_s + dt_s
     s.alone_s = 0.0 if s.helped_s >= p.gps_back_s else s.alone_s + dt_s
-    return LAND if s.alone_s > (p.circle_s if no_gps else p.level_s) else LEVEL
+    too_long = s.alone_s > (p.circle_s if no_gps else p.level_s)
+    return LAND if too_long or (s.mode == LAND and s.alone_s > 0.0) else LEVEL
 
 
 @kernel
