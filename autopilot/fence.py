@@ -1,10 +1,11 @@
 """The geofence: a cylinder around the launch point, and what the autopilot does before it is left.
 
 The fence looks ahead: it acts where the outward velocity over the ground would carry the aeroplane across within
-`ahead_s`, the time of half a turn.  With the wind behind, it acts earlier; along the fence, it does not act.  Measured with
-`endurance` at cruise, course straight out, fence of 200 m: inside in calm air and head wind, at most 15 m beyond it with
-5 m/s from behind, 55 m with 8 m/s.  The
+`ahead_s`, the time of half a turn.  With the wind behind, it acts earlier; along the fence, it does not act.  The
 height demanded of the autopilot stays `ceiling_margin_m` below the ceiling.  Without a position there is no fence.
+
+Measured with `endurance` at cruise, course straight out, fence of 200 m: it stays inside in calm air and in head wind,
+and comes at most 15 m beyond it with 5 m/s of wind from behind, 55 m with 8 m/s.
 """
 
 import math
@@ -79,7 +80,7 @@ def mind_fence(row, height_m, s, f, g, cruise_m_s):  # type: ignore[no-untyped-d
     """Update `s.fenced`: whether the fence determines the mode; only with a position.
 
     row : measured   height_m : present   f, g : records of FenceParams, GuidanceParams   cruise_m_s : airspeed
-    s : record with `unseen_turn_rad`, `fenced`, `fenced_by` (number of the setpoint under which it acted) and `setpoints`, their number
+    s : record with `unseen_turn_rad`, `fenced`, `fenced_by` (number of the setpoint then), `setpoints` (of this one)
     """
     if not (math.isfinite(f.radius_m) or math.isfinite(f.height_m)) or f.action == FENCE_REPORT:
         return
@@ -98,7 +99,7 @@ def mind_fence(row, height_m, s, f, g, cruise_m_s):  # type: ignore[no-untyped-d
         s.fenced = 1
         return
     inside_m = min(f.release_m, 0.5 * f.radius_m)
-    back = distance_m < f.radius_m - inside_m and height_m < f.height_m - 0.5 * f.ceiling_margin_m
+    back = reach_m < f.radius_m - inside_m and top_m < f.height_m - 0.5 * f.ceiling_margin_m
     lasting = f.action in (FENCE_LOITER, FENCE_GLIDE) and s.fenced_by == s.setpoints
     if back and not lasting:
         s.fenced = 0

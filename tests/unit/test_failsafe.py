@@ -494,7 +494,7 @@ def test_launch_without_any_fix_ends_its_climb_by_the_barometer():
 
 
 BY_HAND, BY_ATTITUDE, BY_PLACE, THROWN = Mode.MANUAL, Mode.STABILISE, Mode.COURSE, Mode.LAUNCH
-GROUPS = {m: BY_PLACE for m in BY_POSITION} | {Mode.MANUAL: BY_HAND, Mode.RATE: BY_HAND}
+GROUPS = dict.fromkeys(BY_POSITION, BY_PLACE) | {Mode.MANUAL: BY_HAND, Mode.RATE: BY_HAND}
 AS_COMMANDED = None
 ENDS = {  # GPS, radio, estimator: where it ends by hand, by attitude, by place, after a launch
     ("works", "works", "healthy"): (AS_COMMANDED, AS_COMMANDED, AS_COMMANDED, AS_COMMANDED),
