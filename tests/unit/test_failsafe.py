@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from autopilot.airframes import params_of
 from autopilot.dcm import DcmAutopilot
 from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
@@ -27,7 +28,9 @@ class Aboard:
     """An autopilot and the measurements it is shown, tick after tick."""
 
     def __init__(self, aircraft="endurance"):
-        self.autopilot, self.row = DcmAutopilot(aircraft=aircraft), np.zeros(1, MEASURED_DTYPE)
+        params = params_of(aircraft)
+        still = replace(params.lift, incidence_per_elevator_rad=0.0)  # it does not move: the elevator tells no speed
+        self.autopilot, self.row = DcmAutopilot(replace(params, lift=still)), np.zeros(1, MEASURED_DTYPE)
         self.row["dt_s"], self.row["force_b_m_s2"] = DT_S, (0.0, 0.0, -9.8)
         self.ticks, self.height_m, self.latency_s, self.numbers, self.ground_m_s = 0, 60.0, 0.3, True, 12.0
         self.dt_s = DT_S
@@ -526,7 +529,7 @@ def test_no_mode_lasts_for_ever_without_somebody_who_can_end_it(mode, conditions
     A launch is thrown first.  The ill estimator tells no numbers any more, which is noticed without a GPS, too.
     """
     gps, radio, estimator = conditions
-    params = replace(DcmAutopilot().params, failsafe=FailsafeParams(return_s=100.0))
+    params = replace(Aboard().autopilot.params, failsafe=FailsafeParams(return_s=100.0))
     aboard = Aboard()
     aboard.autopilot, aboard.dt_s = DcmAutopilot(params), 0.1
     well = poor(health=Health.STARTING) if estimator == "never healthy" else None
