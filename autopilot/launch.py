@@ -10,7 +10,7 @@ If the aeroplane is slowed down instead, it is still in the hand, and the push d
 import math
 from dataclasses import dataclass
 
-from autopilot.energy import SLOWEST, hold_height, throttle_for
+from autopilot.energy import SLOWEST, hold_height, most_climb, throttle_for
 from autopilot.guidance import height
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
@@ -41,9 +41,9 @@ class LaunchParams:
         default 2).  Higher: more speed before the climb
     level_off_m : the height loop takes over this far below the height (m, default 5).  Higher: smoother, slower
     climb_pitch_rad : pitch of the climb (rad, default 12 deg).  Higher: steeper and slower, up to the stall
-    alpha_rad : largest angle of attack while it gathers speed, by inertial reckoning (rad, default 12.5 deg).  Higher:
+    alpha_rad : largest angle of attack while it gathers speed, by inertial reckoning (rad, default 13.5 deg).  Higher:
         a slow throw stalls; lower: it sinks more
-    alpha_gain_1_s : pitch rate allowed per angle left below that (1/s, default 10).  Higher: the nose drops later
+    alpha_gain_1_s : pitch rate allowed per angle left below that (1/s, default 13).  Higher: the nose drops later
         and faster
     """
 
@@ -57,8 +57,8 @@ class LaunchParams:
     full_throttle_s: float = 2.0
     level_off_m: float = 5.0
     climb_pitch_rad: float = math.radians(12.0)
-    alpha_rad: float = math.radians(12.5)
-    alpha_gain_1_s: float = 10.0
+    alpha_rad: float = math.radians(13.5)
+    alpha_gain_1_s: float = 13.0
 
 
 @kernel
@@ -113,8 +113,11 @@ def climb_away(thrown_s, height_m, row, s, p, dt_s):  # type: ignore[no-untyped-
         s.levelled_off = 1
     if s.levelled_off:
         return hold_height(height_m, row, s, p, dt_s)
-    throttle = 1.0 if thrown_s < launch.full_throttle_s else throttle_for(launch.climb_pitch_rad, s, p.energy)
-    return launch.climb_pitch_rad, throttle
+    if thrown_s < launch.full_throttle_s:
+        return launch.climb_pitch_rad, 1.0
+    steepest_rad = p.energy.pitch_trim_rad + most_climb(s, p.energy) / s.airspeed_wanted_m_s
+    pitch_rad = clip(steepest_rad, -p.energy.pitch_limit_rad, launch.climb_pitch_rad)
+    return pitch_rad, throttle_for(launch.climb_pitch_rad, s, p.energy)
 
 
 @kernel
@@ -138,7 +141,7 @@ def reckon_throw(R_eb, omega_b_rad_s, row, s, p, dt_s):  # type: ignore[no-untyp
     s.ahead_m_s += ahead_m_s2 * dt_s
     s.below_m_s += below_m_s2 * dt_s
     if s.air_left_s <= 0.0:
-        s.airspeed_m_s = clip(s.ahead_m_s, SLOWEST * p.energy.airspeed_m_s, p.energy.airspeed_m_s)
+        s.airspeed_m_s = clip(s.ahead_m_s / s.true_factor, SLOWEST * p.energy.airspeed_m_s, p.energy.airspeed_m_s)
 
 
 @kernel

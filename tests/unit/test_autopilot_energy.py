@@ -41,6 +41,7 @@ def record(params=None):
 def state(airspeed_m_s=CRUISE_M_S, wanted_m_s=CRUISE_M_S, *, known=0, inverted=0):
     s = np.zeros(1, _STATE)[0]
     s["airspeed_m_s"], s["airspeed_wanted_m_s"] = airspeed_m_s, wanted_m_s
+    s["true_factor"] = 1.0
     s["airspeed_known"], s["inverted"] = known, inverted
     return s
 
@@ -50,7 +51,7 @@ def row_of(height_m=50.0, v_e_m_s=(0.0, 0.0, 0.0), *, valid=1, airspeed_m_s=math
     row["t_s"], row["gps_t_s"], row["gps_valid"] = 10.0, 9.7, valid
     row["gps_v_e_m_s"] = v_e_m_s
     row["gps_p_e_m"] = (0.0, 0.0, -height_m - 1.3 * v_e_m_s[2])  # the fix is 1.3 s old
-    row["airspeed_m_s"], row["air_new"] = airspeed_m_s, math.isfinite(airspeed_m_s)
+    row["equivalent_airspeed_m_s"], row["air_new"] = airspeed_m_s, math.isfinite(airspeed_m_s)
     return row
 
 

@@ -14,8 +14,12 @@ from estimator.instruments import PROPERTIES, property_names, property_value
 from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.config.air import parse_wind, resolve_air
+from scenarios.harness.config.battery import BatteryConfig
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
+from scenarios.harness.config.fence import FenceConfig, within_box
+from scenarios.harness.config.place import PlaceConfig
 from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
+from scenarios.harness.config.tolerances import AirframeConfig, TolerancesConfig, resolve_airframe
 from scenarios.harness.config.validation import validated
 from scenarios.harness.plugins import Maker
 from scenarios.harness.seeds import LARGEST_SEED
@@ -77,8 +81,10 @@ class FlightConfig(_Model):
     turn_table : the magnetometer was turned on a table before the flight: an estimator with a parameter
     ``calibration`` is given the result, see `aboard`
     files : path -> text of the user's own sensor files; a resolved configuration holds them
+    airframe, tolerances : differences of the aeroplane from its drawing, and the deviations they are drawn from
     manoeuvre : the scenario's own parameters
-    faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
+    faults : of sensors, surfaces and motor, each as text, ``gyro.x:stuck@20-25``, see `config.faults.parse_fault`
+    fence : the geofence, see `config.fence`
     box_radius_m, box_height_m : of the cylinder around the launch point; the flight ends when it is left
     seed, flight : campaign, and number of the flight in it: they name the random streams
     """
@@ -96,9 +102,14 @@ class FlightConfig(_Model):
     turn_table: bool = False
     files: dict[str, str] = Field(default_factory=dict)
     faults: tuple[str, ...] = ()
+    battery: BatteryConfig = Field(default_factory=BatteryConfig)
     air: AirConfig = Field(default_factory=AirConfig)
+    place: PlaceConfig = Field(default_factory=PlaceConfig)
+    airframe: AirframeConfig = Field(default_factory=AirframeConfig)
+    tolerances: TolerancesConfig = Field(default_factory=TolerancesConfig)
     start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
+    fence: FenceConfig = Field(default_factory=FenceConfig)
     box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
     box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
     seed: int = Field(default=0, ge=0, le=LARGEST_SEED)
@@ -128,6 +139,11 @@ class FlightConfig(_Model):
         return self
 
     @model_validator(mode="after")
+    def _fence_within_box(self) -> "FlightConfig":
+        within_box(self.fence, self.box_radius_m, self.box_height_m)
+        return self
+
+    @model_validator(mode="after")
     def _fits_in_memory(self) -> "FlightConfig":
         tick_s = 1.0 / self.rates.imu_hz
         if self.duration_s < tick_s:
@@ -147,6 +163,11 @@ class FlightConfig(_Model):
         if isinstance(heading_deg, str):
             raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
         return heading_deg
+
+    @property
+    def flies(self) -> bool:
+        """Whether it leaves the table."""
+        return not isinstance(self.start, BenchStart)
 
     @property
     def held_s(self) -> float:
@@ -198,7 +219,9 @@ def overridden(
             _put(data, full_name, value)
     changed = validated(FlightConfig, data)
     fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
-    require_faults_possible(changed.faults, fitted)
+    flies = not isinstance(changed.start, BenchStart)
+    require_faults_possible(changed.faults, fitted, changed.rates.gps_hz, changed.aircraft, flies)
+    changed.battery.require_possible(changed.aircraft, flies)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed, fitted
@@ -209,7 +232,7 @@ def fitted_suite(config: FlightConfig) -> SuiteParams:
     return suite_params(config.suite, config.sensors, config.files)
 
 
-_TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts")
+_TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts", "fence.action")
 
 
 def is_field(name: str, config: FlightConfig, overrides: Mapping[str, Any]) -> bool:
@@ -301,10 +324,11 @@ def resolve(config: FlightConfig, suite: SuiteParams | None = None) -> FlightCon
     """
     start = resolve_start(config.start, config.seed, config.flight)
     air = resolve_air(config.air, start.heading_deg, config.seed, config.flight)
-    files = config.files or own_files(config.suite)
-    return config.model_copy(
-        update={"start": start, "air": air, "files": files, "rates": _resolve_rates(config, suite)}
+    files, rates = config.files or own_files(config.suite), _resolve_rates(config, suite)
+    airframe = resolve_airframe(
+        config.airframe, config.tolerances, config.aircraft, config.flies, config.seed, config.flight
     )
+    return config.model_copy(update={"start": start, "air": air, "airframe": airframe, "files": files, "rates": rates})
 
 
 def _resolve_rates(config: FlightConfig, suite: SuiteParams | None) -> RatesConfig:
