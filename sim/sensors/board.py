@@ -31,7 +31,8 @@ class BoardParams:
     rest_s : time the firmware averages the sensors, level on the ground, before a flight that starts in the air; a
         throw is calibrated in the hand (s, default 0: not at all).  Higher: the turn-on bias is known better
     warming_k : how much warmer the parts end up than at power-up (K, default 0)
-    warming_s : time constant of the warm-up (s, default 300).  Lower: biases change faster after power-up
+    warming_s : time constant of the warm-up, and of a gyro's drift with it (s, default 300).  Lower: biases change
+        sooner after power-up, and a drift ends sooner and smaller
     vibration_g, vibration_deg_s : amplitude per axis at the motor speed `vibration_rpm`, once per revolution; it
         grows with the square of the speed, as of an unbalanced rotor (g and deg/s, default 0)
     vibration_rpm : motor speed at which those amplitudes hold (rpm, default 8000).  Higher: less at the same speed
