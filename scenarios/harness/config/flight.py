@@ -78,7 +78,7 @@ class FlightConfig(_Model):
     ``calibration`` is given the result, see `aboard`
     files : path -> text of the user's own sensor files; a resolved configuration holds them
     manoeuvre : the scenario's own parameters
-    faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
+    faults : of sensors, surfaces and motor, each as text, ``gyro.x:stuck@20-25``, see `config.faults.parse_fault`
     box_radius_m, box_height_m : of the cylinder around the launch point; the flight ends when it is left
     seed, flight : campaign, and number of the flight in it: they name the random streams
     """
@@ -198,7 +198,8 @@ def overridden(
             _put(data, full_name, value)
     changed = validated(FlightConfig, data)
     fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
-    require_faults_possible(changed.faults, fitted)
+    flies = not isinstance(changed.start, BenchStart)
+    require_faults_possible(changed.faults, fitted, changed.rates.gps_hz, changed.aircraft, flies)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed, fitted
