@@ -244,7 +244,7 @@ def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
             else:
                 row.mag_b_ut[i] = _wrong(row.mag_b_ut[i], before.mag_b_ut[i], fault)
         elif fault.part == _AIRSPEED:
-            row.airspeed_m_s = _wrong(row.airspeed_m_s, before.airspeed_m_s, fault)
+            row.equivalent_airspeed_m_s = _wrong(row.equivalent_airspeed_m_s, before.equivalent_airspeed_m_s, fault)
         elif fault.part == _BAROMETER:
             row.baro_height_m = _wrong(row.baro_height_m, before.baro_height_m, fault)
         elif fault.part == _GPS and row.gps_new:

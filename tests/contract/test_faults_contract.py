@@ -30,7 +30,7 @@ COLUMNS = {
     "gyro": ("gyro_b_rad_s",),
     "accelerometer": ("force_b_m_s2",),
     "magnetometer": ("mag_new", "mag_b_ut"),
-    "airspeed": ("airspeed_m_s",),
+    "airspeed": ("equivalent_airspeed_m_s",),
     "barometer": ("baro_height_m",),
     "gps": ("gps_new", "gps_valid", "gps_t_s", "gps_p_e_m", "gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s"),
 }

@@ -31,7 +31,7 @@ IN = slice(99, 149)  # the rows whose intervals end at 1 s <= t < 2 s after the 
 WINDOW = "@1-2"
 COLUMN = {
     "gyro": "gyro_b_rad_s", "accelerometer": "force_b_m_s2", "magnetometer": "mag_b_ut",
-    "airspeed": "airspeed_m_s", "barometer": "baro_height_m",
+    "airspeed": "equivalent_airspeed_m_s", "barometer": "baro_height_m",
 }  # fmt: skip
 SI = {"gyro": math.radians(1.0), "accelerometer": 9.80665, "magnetometer": 1.0, "airspeed": 1.0, "barometer": 1.0}
 FITTED = SuiteParams(
@@ -363,8 +363,8 @@ def test_saturated_magnetometer_and_pitot_tube_read_their_full_scale():
     _, measured = spoiled(f"mag:saturated{WINDOW}", f"airspeed:saturated{WINDOW}", "airspeed:saturated=-1@2")
     np.testing.assert_allclose(measured["mag_b_ut"][104:149], 100.0, rtol=0, atol=1e-12)
     fastest = math.sqrt(2.0 * 500.0 / density_kg_m3(ELEVATION_M))
-    np.testing.assert_allclose(measured["airspeed_m_s"][104:149], fastest, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(measured["airspeed_m_s"][149:], 0.0)
+    np.testing.assert_allclose(measured["equivalent_airspeed_m_s"][104:149], fastest, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(measured["equivalent_airspeed_m_s"][149:], 0.0)
 
 
 def test_saturated_compass_that_tells_an_overflow_reads_its_code():
