@@ -173,7 +173,7 @@ def draw(
         error_pa += barometer.noise_pa * source("barometer noise").standard_normal(n)
     if barometer.drift_pa_min > 0.0:
         rate_pa_s = barometer.drift_pa_min / 60.0 * source("barometer drift").standard_normal()
-        error_pa += rate_pa_s * levelling_off(rates.dt_s * np.arange(1, n + 1), barometer.drift_s)
+        error_pa += rate_pa_s * levelling_off(rates.dt_s * np.arange(1.0, n + 1.0), barometer.drift_s)
     if barometer.wander_pa > 0.0:
         steps = source("barometer wander").standard_normal((n, 1))
         error_pa += gauss_markov(steps, np.array([barometer.wander_pa]), barometer.wander_s, rates.dt_s)[:, 0]
