@@ -16,6 +16,7 @@ from scenarios.harness.aboard import equipped_estimator, instruments_of
 from scenarios.harness.config import FlightConfig, InFlightStart, fitted_suite, overridden, resolve
 from scenarios.harness.config.faults import parse_fault
 from scenarios.harness.config.plant import build_plant
+from scenarios.harness.config.tolerances import require_sound
 from scenarios.harness.equipping import Equipped, equipped_autopilot, heading_reference_of, learnt
 from scenarios.harness.own_files import library_named
 from scenarios.harness.plugins import Maker, PluginError, maker_name
@@ -150,6 +151,7 @@ def _prepare(
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
     config = resolve(config, suite)
+    require_sound(config.airframe, config.aircraft, config.rates.physics_hz, config.flies)
     instruments = instruments_of(config, suite)
     estimator, config = equipped_estimator(config, suite, instruments, maker)
     reference = heading_reference_of(estimator.code)

@@ -15,7 +15,8 @@ from autopilot.interface import NEUTRAL, ActuatorCommand
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.aeroplane import hand
-from sim.aeroplane.jsbsim_model import FT_TO_M, LB_TO_N, WIND, WRITE, Model
+from sim.aeroplane.built import AS_DRAWN, AsBuilt
+from sim.aeroplane.jsbsim_model import FT_TO_M, LB_TO_N, WIND, Model
 from sim.aeroplane.trim import Trim, trim
 from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
@@ -133,6 +134,7 @@ class JsbsimPlant:
     rates : physics and inertial rates
     seed, flight : of the random streams (used here only by turbulence)
     box : limits of the flight; a start outside is rejected
+    built : how the aeroplane differs from its drawing
 
     Raises ValueError for an unknown aircraft or an impossible start.
     """
@@ -140,12 +142,13 @@ class JsbsimPlant:
     def __init__(
         self, aircraft: str = "endurance", *, start: Start, air: Air = STILL, rates: Rates | None = None,
         seed: int = 0, flight: int = 0, box: FlightBox | None = None,
+        built: AsBuilt = AS_DRAWN,
     ) -> None:  # fmt: skip
         rates = rates or Rates()
         box = box or FlightBox()
         self.start, self.air = start, air
         self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
-        self._physics_hz, self._aircraft = rates.physics_hz, aircraft
+        self._physics_hz, self._aircraft, self._built = rates.physics_hz, aircraft, built
         self._hold_ticks = self._release_tick = self._hand_ticks = 0
         if isinstance(start, HandThrow):
             hand.check(start)
@@ -181,9 +184,9 @@ class JsbsimPlant:
 
     def _load(self) -> None:
         """A new JSBSim for each flight: a diverged state survives any reset."""
-        self.model = Model(self._aircraft, self._physics_hz)
+        self.model = Model(self._aircraft, self._physics_hz, self._built)
         self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
-        self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._aileron, self._elevator, self._rudder, self._throttle = self.model.servo_setters()
         self._wind = tuple(self.model.setter(p) for p in WIND)
         self._air_rates = tuple(self.model.setter(p) for p in AIR_RATES if self.model.has(p))
         self._pack = Struct(f"{len(self._getters)}d").pack_into

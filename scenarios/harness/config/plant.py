@@ -5,6 +5,7 @@ import math
 from scenarios.harness.config.air import build_air
 from scenarios.harness.config.flight import FlightConfig
 from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStart
+from scenarios.harness.config.tolerances import built
 from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.clock import Rates
 from sim.motion.prescribed_plant import PrescribedPlant, Rest
@@ -26,6 +27,7 @@ def build_plant(config: FlightConfig, rates: Rates) -> Plant:
         seed=config.seed,
         flight=config.flight,
         box=FlightBox(config.box_radius_m, config.box_height_m),
+        built=built(config.airframe),
     )
 
 
