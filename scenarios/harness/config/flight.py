@@ -324,8 +324,6 @@ def _resolve_rates(config: FlightConfig, suite: SuiteParams | None) -> RatesConf
     if rates.gps_hz is not None and rates.physics_hz is not None:
         return rates
     receiver_hz = rates.gps_hz or (suite or fitted_suite(config)).gps.rate_hz
-    rates = rates.model_copy(
-        update={"gps_hz": receiver_hz, "physics_hz": rates.physics_hz or physics_hz(rates.imu_hz)}
-    )
+    rates = rates.model_copy(update={"gps_hz": receiver_hz, "physics_hz": rates.physics_hz or physics_hz(rates.imu_hz)})
     rates.build()  # refuses a receiver whose rate the physics cannot keep
     return rates
