@@ -14,6 +14,7 @@ from estimator.instruments import PROPERTIES, property_names, property_value
 from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.config.air import parse_wind, resolve_air
+from scenarios.harness.config.battery import BatteryConfig
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
 from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
 from scenarios.harness.config.tolerances import AirframeConfig, TolerancesConfig, resolve_airframe
@@ -99,6 +100,7 @@ class FlightConfig(_Model):
     turn_table: bool = False
     files: dict[str, str] = Field(default_factory=dict)
     faults: tuple[str, ...] = ()
+    battery: BatteryConfig = Field(default_factory=BatteryConfig)
     air: AirConfig = Field(default_factory=AirConfig)
     airframe: AirframeConfig = Field(default_factory=AirframeConfig)
     tolerances: TolerancesConfig = Field(default_factory=TolerancesConfig)
@@ -210,6 +212,7 @@ def overridden(
     fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
     flies = not isinstance(changed.start, BenchStart)
     require_faults_possible(changed.faults, fitted, changed.rates.gps_hz, changed.aircraft, flies)
+    changed.battery.require_possible(changed.aircraft, flies)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed, fitted
