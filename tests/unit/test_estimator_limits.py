@@ -35,7 +35,7 @@ def level_flight(offset_deg_s, seconds):
     rows["gps_new"][9::10] = rows["gps_valid"][9:] = 1
     rows["gps_t_s"], rows["gps_v_e_m_s"][:, 0], rows["gps_speed_m_s"] = rows["t_s"], 15.0, 15.0
     rows["mag_new"][4::5], rows["mag_b_ut"] = 1, (20.0, 0.0, 40.0)
-    rows["airspeed_m_s"] = rows["baro_height_m"] = np.nan
+    rows["equivalent_airspeed_m_s"] = rows["baro_height_m"] = np.nan
     return rows
 
 
