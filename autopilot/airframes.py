@@ -11,12 +11,14 @@ from types import MappingProxyType
 
 from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
+from autopilot.fence import FenceParams
 from autopilot.guidance import GuidanceParams
 from autopilot.launch import LaunchParams
 from autopilot.lift import LiftParams
 from autopilot.mixer import MixerParams
 from autopilot.route import RouteParams
 from autopilot.stabilise import StabiliseParams
+from autopilot.standby import StandbyParams
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,8 @@ class AutopilotParams:
     mixer: MixerParams = field(default_factory=MixerParams)
     route: RouteParams = field(default_factory=RouteParams)
     failsafe: FailsafeParams = field(default_factory=FailsafeParams)
+    standby: StandbyParams = field(default_factory=StandbyParams)
+    fence: FenceParams = field(default_factory=FenceParams)
 
 
 # Steeper than the best glide (6.3 m/s, pitch -2.6 degrees): airspeed is not measured, and a pitch estimate 5 degrees
@@ -41,7 +45,7 @@ _GLIDE_PITCH_RAD = math.radians(-5.0)
 _GENTLE_LADY = AutopilotParams(
     stabilise=StabiliseParams(
         airspeed_m_s=_GLIDE_M_S,
-        # Rudder causes sideslip, which causes roll, with the Dutch roll (period 1.6 s) in between: bank is slow.
+        # Rudder causes sideslip, which causes roll, with the Dutch roll (period 1.7 s) in between: bank is slow.
         roll_gain_1_s=1.8,
         roll_rate_limit_rad_s=0.5,
         roll_control_per_rate_s=1.2,
