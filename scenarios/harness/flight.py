@@ -25,7 +25,7 @@ from scenarios.harness.scenario import Scenario, ScriptFailed
 from sim.aeroplane.battery import Battery
 from sim.clock import Rates
 from sim.events import events_of_battery, events_of_faults, events_of_fence
-from sim.faults import Fault, of_family
+from sim.faults import Fault
 from sim.log import Event, Flight, Log, Outcome
 from sim.loop import Watch, fly
 from sim.params import near_misses
@@ -90,7 +90,7 @@ class Prepared:
         on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight, place) if airborne else None
         flown = fly(
             plant,
-            Suite(self.suite, rates, config.seed, config.flight, of_family("sensor", faults), plant.release_s, place),
+            Suite(self.suite, rates, config.seed, config.flight, faults, plant.release_s, place),
             self.estimator.code,
             self.autopilot.code,
             self.script,

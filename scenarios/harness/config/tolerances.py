@@ -138,7 +138,7 @@ def require_sound(config: "FlightConfig") -> None:
     if as_built != AS_DRAWN:
         if not config.flies:
             raise ValueError("airframe: the flight is on a table, where it changes nothing; leave it as it is")
-        require_flyable(Model(config.aircraft, config.rates.physics_hz, as_built, config.place.build()))
+        require_flyable(Model(config.aircraft, config.rates.build().physics_hz, as_built, config.place.build()))
 
 
 def _normal(rng: np.random.Generator) -> float:
