@@ -104,7 +104,6 @@ MUTATIONS = (
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("motor_dead", "premerlani", IGNORES_THE_ELEVATOR, "angle of attack"),
-    Mutation("motor_dead", "accelerometer_only", {}, "inclination error RMS in the glide"),
     Mutation("motor_dead", "premerlani", {"faults": "motor:dead@20-25"}, "time to the ground"),
     Mutation("motor_dead_battery", "premerlani", IGNORES_THE_ELEVATOR, "angle of attack"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
