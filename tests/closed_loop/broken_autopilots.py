@@ -115,3 +115,12 @@ class IgnoresTheElevator(DcmAutopilot):
         params = params_of(aircraft)
         numb = replace(params, lift=replace(params.lift, incidence_per_elevator_rad=0.0))
         super().__init__(numb, heading_reference, aircraft)
+
+
+class NeverTrims(DcmAutopilot):
+    """Learns no deflection that holds an attitude: without the integrals of the rate errors."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        params = params_of(aircraft)
+        untrimmed = replace(params, stabilise=replace(params.stabilise, integral_limit=0.0))
+        super().__init__(untrimmed, heading_reference, aircraft)

@@ -34,6 +34,7 @@ CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
 IGNORES_THE_ELEVATOR = {"autopilot": f"{BROKEN_AUTOPILOTS}:IgnoresTheElevator"}
+NEVER_TRIMS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverTrims"}
 RUDDER_STUCK = {"autopilot": f"{BROKEN_AUTOPILOTS}:RudderStuck"}
 
 
@@ -112,6 +113,7 @@ MUTATIONS = (
     Mutation("motor_dead", "premerlani", IGNORES_THE_ELEVATOR, "angle of attack"),
     Mutation("motor_dead", "premerlani", {"faults": "motor:dead@20-25"}, "time to the ground"),
     Mutation("motor_dead_battery", "premerlani", IGNORES_THE_ELEVATOR, "angle of attack"),
+    Mutation("maiden_flight", "premerlani", NEVER_TRIMS, "off the course RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("return_to_launch_strong_wind", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("return_to_launch_strong_wind_nose", "premerlani", NO_YAW, "first within 25 m of the launch point"),
