@@ -17,6 +17,7 @@ from autopilot.energy import (
     want_airspeed,
 )
 from autopilot.failsafe import circle, examine, listen, mode_in_force
+from autopilot.fixes import take_in
 from autopilot.guidance import (
     agility,
     bank_for_heading,
@@ -49,9 +50,10 @@ from autopilot.launch import climb_away, feel_throw
 from autopilot.mixer import mix
 from autopilot.route import bank_along_route, bank_to_circle
 from autopilot.stabilise import rate_control, rate_demand
+from estimator.blocks.gps_integrity import WATCH
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
-from estimator.interface import POOR, AttitudeEstimate, HeadingReference, Measurements
+from estimator.interface import MEASURED_DTYPE, POOR, AttitudeEstimate, HeadingReference, Measurements
 
 
 def _floats(params: type[Any]) -> np.dtype[Any]:
@@ -103,11 +105,15 @@ _STATE = np.dtype(
         ("wind_kept_e_m_s", "f8", (3,)),  # its wind, NaN if unknown
         ("omega_kept_b_rad_s", "f8", (3,)),
         ("height_kept_m", "f8"),  # at the start of LEVEL
+        ("fix_held_back", "i8"),  # the last fix cannot be true
+        *((c.name, "i8" if c.integer else "f8", c.shape) for c in WATCH),
     ],
     align=True,
 )
 # One array with everything the kernel needs besides the inputs of a tick: each array argument costs time per call.
-_MEMORY = np.dtype([("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8")], align=True)
+_MEMORY = np.dtype(
+    [("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8"), ("seen", MEASURED_DTYPE)], align=True
+)
 
 _WIND_UNKNOWN = np.full(3, np.nan)
 _DT_LIMIT_S = 0.1  # longer sample intervals are gaps and are not integrated in full
@@ -251,7 +257,8 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     rows, k : measured log and its row   memory : shape (1,), parameters, setpoint and state
     """
     me = memory[0]
-    setpoint, s, p, row = me.setpoint, me.s, me.p, rows[k]
+    setpoint, s, p, row = me.setpoint, me.s, me.p, me.seen
+    take_in(rows[k], row, s)
     known = math.isfinite(row.dt_s)
     dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S) if known else 0.0
     for i in range(3):
@@ -327,6 +334,7 @@ class DcmAutopilot:
         for group in _GROUPS:
             me["p"][group] = astuple(getattr(self.params, group))
         me["s"]["mode"] = me["s"]["setpoint_mode"] = me["s"]["led_by"] = me["s"]["thrown_s"] = -1
+        me["s"]["placed"] = 1  # unlike an estimator, it needs a position
         me["s"]["believed"], me["s"]["heard_s"], me["s"]["R_kept_eb"] = 1, math.inf, np.eye(3)
         me["on_nose"] = self.heading_reference == "nose"
         self._setpoint: Setpoint | None = None

@@ -24,7 +24,8 @@ LOITER, WAYPOINTS,
 completed LAUNCH
 ==================  ==========================================  ================================================
 
-The GPS counts as working while fixes arrive, even if they are 12 s late.  An estimator that is POOR for lack of fixes
+The GPS counts as working while fixes arrive, even if they are 12 s late; a fix that cannot be true is none, see
+`estimator.blocks.gps_integrity`.  An estimator that is POOR for lack of fixes
 is handled by CIRCLE; one that was never healthy leaves no attitude to fall back on.  After a failsafe the commanded
 mode continues where it was: a detected throw stays detected, a route continues to its next waypoint.
 """
@@ -91,13 +92,14 @@ class FailsafeParams:
 def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Update the GPS status: time without fixes, and time since the last outage.
 
-    row : measured   s : record with `silent_s`, `heard_s`, `circled_s`, updated   p : record of FailsafeParams
+    row : measured   p : record of FailsafeParams
+    s : record with `gps_lost`; `silent_s`, `heard_s`, `circled_s` are updated
     """
     arrived = row.gps_new != 0 and is_fix(row)
     s.silent_s = 0.0 if arrived or row.gps_valid == 0 else s.silent_s + dt_s
     heard = s.heard_s >= p.gps_back_s
     patience_s = p.gps_lost_s if heard else 0.5 * p.gps_lost_s
-    s.heard_s = 0.0 if s.silent_s > patience_s else s.heard_s + dt_s
+    s.heard_s = 0.0 if s.gps_lost or s.silent_s > patience_s else s.heard_s + dt_s
     if heard:
         s.circled_s = 0.0
 

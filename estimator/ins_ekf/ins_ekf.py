@@ -56,7 +56,7 @@ import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.magnetometer import FIELD, take_field
-from estimator.blocks.screening import COAST_S, FORCE_GOOD, GPS, GYRO_GOOD, airspeed_came, refuse, screen
+from estimator.blocks.screening import COAST_S, FORCE_GOOD, GPS, GYRO_GOOD, airspeed_came, fix_came, refuse, screen
 from estimator.compiler.jit import kernel
 from estimator.ins_ekf.flight import (
     CUT_FORCE,
@@ -249,7 +249,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     good = screen(row, s)
     if good:
         push(row, s, good)
-        if row.gps_new:
+        if fix_came(row, s):
             attach_fix(row, s)
         attach_others(row, s)
         turn_on(s, (s.oldest + s.waiting - 1) % SIZE)
