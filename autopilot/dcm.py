@@ -26,6 +26,7 @@ from autopilot.guidance import (
     gps_age,
     heading_error,
     height,
+    turn_rate,
     unseen_turn,
     way_wanted,
 )
@@ -258,7 +259,7 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     """
     me = memory[0]
     setpoint, s, p, row = me.setpoint, me.s, me.p, me.seen
-    take_in(rows[k], row, s)
+    take_in(rows[k], turn_rate(R_eb, omega_b_rad_s), row, s)
     known = math.isfinite(row.dt_s)
     dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S) if known else 0.0
     for i in range(3):

@@ -8,9 +8,10 @@ from estimator.compiler.jit import inlined, kernel
 
 
 @inlined
-def take_in(row, seen, s):  # type: ignore[no-untyped-def]
+def take_in(row, turn_rad_s, seen, s):  # type: ignore[no-untyped-def]
     """Copy the measured `row` into the record `seen`, except a fix that cannot be true, until the next one.
 
+    turn_rad_s : rate about the vertical, of the estimate; NaN if it is not known
     s : record of `WATCH`, with `fix_held_back`, updated
     """
     seen.t_s, seen.dt_s = row.t_s, row.dt_s
@@ -20,7 +21,7 @@ def take_in(row, seen, s):  # type: ignore[no-untyped-def]
     seen.mag_new, seen.air_new = row.mag_new, row.air_new
     seen.equivalent_airspeed_m_s, seen.baro_height_m = row.equivalent_airspeed_m_s, row.baro_height_m
     if row.gps_new:
-        s.fix_held_back = 0 if fix_is_sound(row, s) else 1
+        s.fix_held_back = 0 if fix_is_sound(row, turn_rad_s, s) else 1
     seen.gps_new = 0
     if not s.fix_held_back:
         take_in_fix(row, seen)

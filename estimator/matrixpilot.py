@@ -229,6 +229,8 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
         s.near_s = s.forward_m_s2 = 0.0
         s.yaw_b[0] = s.yaw_b[1] = s.yaw_b[2] = 0.0
     if not fix_came(row, s):
+        if row.gps_new:  # nor can the correction that is held from the last one be trusted
+            s.forward_m_s2 = s.yaw_b[0] = s.yaw_b[1] = s.yaw_b[2] = 0.0
         return
     course, speed, sink, down = row.gps_course_rad, row.gps_speed_m_s, row.gps_v_e_m_s[2], row.gps_p_e_m[2]
     vertical = abs(down) < 1e6 if s.climb_from_height else abs(sink) < 1000.0

@@ -12,6 +12,7 @@ Only horizontally: many receivers report no vertical velocity.  A fix is refused
 - if it is *frozen*: the position repeats to the last bit while the reported speed has covered 3 m, or position and
   velocity repeat for 2 s while the speed is not zero.  Frozen for 1 s, the GPS is lost.  A receiver at rest that holds
   its position reports a speed of zero and is not frozen;
+- if its course keeps to the last bit while the gyros have seen a turn of 20 degrees; for 1 s, the GPS is lost;
 - while the GPS is *lost*: also if ``|r|`` exceeds its limit, when the velocity is frozen, or its course, and the
   aeroplane turns.  It is found again by consistent fixes for 2 s.
 
@@ -28,9 +29,14 @@ at 1 Hz, standard deviation 1.1 m on each axis; a u-blox M10 1.5 m), and ``|e|``
 What cannot be seen: a velocity or course that freezes in straight flight, which does no harm until it turns; a position
 that drifts with a velocity to match, as by a transmitter that imitates satellites.
 
+A receiver that rounds its course to whole degrees repeats it in straight flight; in a turn it may repeat it for its
+latency, and that costs a fix or two.
+
 An estimator that uses this has the columns of `WATCH` in its state, of `compiled.BELIEF` and of `screening.SCREEN`.
 A position of zero in all fixes means that the log has none: then nothing is checked.
 """
+
+import math
 
 import numpy as np
 
@@ -49,7 +55,8 @@ REPEATS_S = 2.0  # a fix that repeats for longer while its speed is not zero is 
 CLEAR_S = 2.0  # consistent fixes for this long end the loss
 ROUND_OFF_S = 1e-6
 STRAIGHT = 1e-6  # sine of a change of direction that is none
-MOST_M, MOST_M_S = 1e7, 1e4  # limits of what is compared
+TURNED_RAD, TURNING_M_S = math.radians(20.0), 3.0  # turn that a course must follow, at a speed that has one
+MOST_M, MOST_M_S, MOST_RAD_S = 1e7, 1e4, 10.0  # limits of what is compared
 
 WATCH = (
     Column("watched", (), "1 once there is a fix to compare with", integer=True),
@@ -67,36 +74,43 @@ WATCH = (
     Column("frozen_s", (), "time for which the position has repeated"),
     Column("frozen_m", (), "distance that it should have covered"),
     Column("repeats_s", (), "time for which position and velocity have repeated"),
+    Column("steady_s", (), "time for which the course has repeated in a turn"),
+    Column("turned_rad", (), "turn since the course last changed"),
     Column("gps_lost", (), "1 while fixes cannot be true", integer=True),
     Column("clear_s", (), "time for which they have been consistent since"),
 )
 
 
 @inlined
-def fix_is_sound(row, s):  # type: ignore[no-untyped-def]
-    """Whether the fix that arrived in `row` can be true, given those before; call it once for each fix."""
+def fix_is_sound(row, turn_rad_s, s):  # type: ignore[no-untyped-def]
+    """Whether the fix that arrived in `row` can be true, given those before; call it once for each fix.
+
+    turn_rad_s : present rate about the vertical, of the gyros
+    """
     p, v = row.gps_p_e_m, row.gps_v_e_m_s
     if p[0] != 0.0 or p[1] != 0.0:
         s.placed = 1
     known = abs(p[0]) < MOST_M and abs(p[1]) < MOST_M and abs(v[0]) < MOST_M_S and abs(v[1]) < MOST_M_S  # NaN is not
     if not s.placed or not known or (v[0] == 0.0 and v[1] == 0.0 and row.gps_speed_m_s > 0.0):
         return True  # nothing to compare
-    return watch(row, s)
+    return watch(row, turn_rad_s, s)
 
 
 @kernel
-def watch(row, s):  # type: ignore[no-untyped-def]
+def watch(row, turn_rad_s, s):  # type: ignore[no-untyped-def]
     """Compare the fix in `row` with those before; returns whether it can be true."""
     interval_s, reach_s = row.t_s - s.came_s, row.t_s - s.base_s
     follows = s.watched != 0 and 0.0 < interval_s <= LONGEST_INTERVAL_S
     frozen = is_frozen(row, s, interval_s) if follows else repeats(row, s)
+    if follows and ignores_turn(row, turn_rad_s, s, interval_s):
+        frozen = True
     held = s.came_v_e_m_s[0] == 0.0 and s.came_v_e_m_s[1] == 0.0 and moves(row)
     s.watched = 1
     s.came_s = row.t_s
     for i in range(3):
         s.came_p_e_m[i], s.came_v_e_m_s[i] = row.gps_p_e_m[i], row.gps_v_e_m_s[i]
     if frozen:
-        if max(s.frozen_s, s.repeats_s) >= FROZEN_S - ROUND_OFF_S:
+        if max(s.frozen_s, s.repeats_s, s.steady_s) >= FROZEN_S - ROUND_OFF_S:
             lose(s)
         return False
     if not follows or held or not 0.0 < reach_s <= LONGEST_REACH_S:
@@ -143,6 +157,25 @@ def is_frozen(row, s, interval_s):  # type: ignore[no-untyped-def]
     else:
         s.frozen_s = s.frozen_m = 0.0
     return s.frozen_m > FROZEN_M or s.repeats_s >= REPEATS_S - ROUND_OFF_S
+
+
+@kernel
+def keeps_course(v, w):  # type: ignore[no-untyped-def]
+    """Whether the velocity `v` has the direction of `w`, to the last bits."""
+    return abs(v[0] * w[1] - v[1] * w[0]) <= STRAIGHT * (w[0] * w[0] + w[1] * w[1])
+
+
+@kernel
+def ignores_turn(row, turn_rad_s, s, interval_s):  # type: ignore[no-untyped-def]
+    """Whether the course has not changed in a turn."""
+    v = row.gps_v_e_m_s
+    if not (keeps_course(v, s.came_v_e_m_s) and np.hypot(v[0], v[1]) >= TURNING_M_S and abs(turn_rad_s) < MOST_RAD_S):
+        s.turned_rad = s.steady_s = 0.0
+        return False
+    s.turned_rad += turn_rad_s * interval_s
+    ignores = abs(s.turned_rad) > TURNED_RAD
+    s.steady_s = s.steady_s + interval_s if ignores else 0.0
+    return ignores
 
 
 @kernel
@@ -200,8 +233,7 @@ def strays(row, s, reach_s):  # type: ignore[no-untyped-def]
     """Whether the displacements of the last seconds are not those of the velocity; takes the fix for the next one."""
     dt_s, v, w = since_base(row, s, reach_s), row.gps_v_e_m_s, s.base_v_e_m_s
     keep = np.exp(-dt_s / MEMORY_S)
-    keeps_course = abs(v[0] * w[1] - v[1] * w[0]) <= STRAIGHT * (w[0] * w[0] + w[1] * w[1])
-    keep_u = 0.5 if keeps_course else keep
+    keep_u = 0.5 if keeps_course(v, w) else keep
     r, u = s.strayed_m, s.veered_m_s
     for i in range(2):
         r[i] = keep * r[i] + unexplained(row, s, dt_s, i)

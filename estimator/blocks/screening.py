@@ -122,7 +122,8 @@ def fix_came(row, s):  # type: ignore[no-untyped-def]
     """Whether a fix arrived in `row` that can be true, see `gps_integrity`; counts a rejection."""
     if not row.gps_new:
         return False
-    if fix_is_sound(row, s):
+    down, rate = s.R_eb[2], s.omega_b_rad_s
+    if fix_is_sound(row, down[0] * rate[0] + down[1] * rate[1] + down[2] * rate[2], s):
         return True
     refuse(s, GPS)
     return False
