@@ -91,9 +91,7 @@ def turn_rate(R_eb, omega_b_rad_s):  # type: ignore[no-untyped-def]
 
 @kernel
 def unseen_turn(unseen_rad, R_eb, omega_b_rad_s, lag_s, dt_s):  # type: ignore[no-untyped-def]
-    """Turn angle not yet visible in a GPS course that lags by `lag_s`, after one tick, rad.
-
-    """
+    """Turn angle not yet visible in a GPS course that lags by `lag_s`, after one tick, rad."""
     turning = turn_rate(R_eb, omega_b_rad_s)
     return clip(unseen_rad + dt_s * (turning - unseen_rad / lag_s), -math.pi, math.pi)
 

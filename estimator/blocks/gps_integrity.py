@@ -12,7 +12,7 @@ Only horizontally: many receivers report no vertical velocity.  A fix is refused
 - if it is *frozen*: the position repeats to the last bit while the reported speed has covered 3 m, or position and
   velocity repeat for 2 s while the speed is not zero.  Frozen for 1 s, the GPS is lost.  A receiver at rest that holds
   its position reports a speed of zero and is not frozen;
-- if its course keeps to the last bit while the gyros have seen a turn of 20 degrees; for 1 s, the GPS is lost;
+- if its course repeats to the last bit while the gyros have seen a turn of 15 degrees; for 1.5 s, the GPS is lost;
 - while the GPS is *lost*: also if ``|r|`` exceeds its limit, when the velocity is frozen, or its course, and the
   aeroplane turns.  It is found again by consistent fixes for 2 s.
 
@@ -55,7 +55,8 @@ REPEATS_S = 2.0  # a fix that repeats for longer while its speed is not zero is 
 CLEAR_S = 2.0  # consistent fixes for this long end the loss
 ROUND_OFF_S = 1e-6
 STRAIGHT = 1e-6  # sine of a change of direction that is none
-TURNED_RAD, TURNING_M_S = math.radians(20.0), 3.0  # turn that a course must follow, at a speed that has one
+TURNED_RAD, TURNING_M_S = math.radians(15.0), 3.0  # turn that a course must follow, at a speed that has one
+IGNORED_S = 1.5  # time for which it has not followed until the GPS is lost
 MOST_M, MOST_M_S, MOST_RAD_S = 1e7, 1e4, 10.0  # limits of what is compared
 
 WATCH = (
@@ -110,7 +111,7 @@ def watch(row, turn_rad_s, s):  # type: ignore[no-untyped-def]
     for i in range(3):
         s.came_p_e_m[i], s.came_v_e_m_s[i] = row.gps_p_e_m[i], row.gps_v_e_m_s[i]
     if frozen:
-        if max(s.frozen_s, s.repeats_s, s.steady_s) >= FROZEN_S - ROUND_OFF_S:
+        if max(s.frozen_s, s.repeats_s) >= FROZEN_S - ROUND_OFF_S or s.steady_s >= IGNORED_S - ROUND_OFF_S:
             lose(s)
         return False
     if not follows or held or not 0.0 < reach_s <= LONGEST_REACH_S:
