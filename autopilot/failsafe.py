@@ -93,13 +93,15 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Update the GPS status: time without fixes, and time since the last outage.
 
     row : measured   p : record of FailsafeParams
-    s : record with `gps_lost`; `silent_s`, `heard_s`, `circled_s` are updated
+    s : record with `gps_lost`, `clear_s`; `silent_s`, `heard_s`, `circled_s` are updated
     """
     arrived = row.gps_new != 0 and is_fix(row)
     s.silent_s = 0.0 if arrived or row.gps_valid == 0 else s.silent_s + dt_s
     heard = s.heard_s >= p.gps_back_s
     patience_s = p.gps_lost_s if heard else 0.5 * p.gps_lost_s
-    s.heard_s = 0.0 if s.gps_lost or s.silent_s > patience_s else s.heard_s + dt_s
+    s.heard_s = 0.0 if s.gps_lost or s.silent_s > patience_s else max(s.heard_s, s.clear_s) + dt_s
+    if not s.gps_lost:
+        s.clear_s = 0.0  # already counted
     if heard:
         s.circled_s = 0.0
 

@@ -12,7 +12,7 @@ Only horizontally: many receivers report no vertical velocity.  A fix is refused
 - if it is *frozen*: the position repeats to the last bit while the reported speed has covered 3 m, or position and
   velocity repeat for 2 s while the speed is not zero.  Frozen for 1 s, the GPS is lost.  A receiver at rest that holds
   its position reports a speed of zero and is not frozen;
-- if its course repeats to the last bit while the gyros have seen a turn of 15 degrees; for 1.5 s, the GPS is lost;
+- if its course repeats to the last bit while the gyros have seen a turn of 15 degrees; for 0.75 s more, the GPS is lost;
 - while the GPS is *lost*: also if ``|r|`` exceeds its limit, when the velocity is frozen, or its course, and the
   aeroplane turns.  It is found again by consistent fixes for 2 s.
 
@@ -56,7 +56,7 @@ CLEAR_S = 2.0  # consistent fixes for this long end the loss
 ROUND_OFF_S = 1e-6
 STRAIGHT = 1e-6  # sine of a change of direction that is none
 TURNED_RAD, TURNING_M_S = math.radians(15.0), 3.0  # turn that a course must follow, at a speed that has one
-IGNORED_S = 1.5  # time for which it has not followed until the GPS is lost
+IGNORED_S = 0.75  # time for which it has not followed a larger one until the GPS is lost
 MOST_M, MOST_M_S, MOST_RAD_S = 1e7, 1e4, 10.0  # limits of what is compared
 
 WATCH = (
@@ -173,9 +173,10 @@ def ignores_turn(row, turn_rad_s, s, interval_s):  # type: ignore[no-untyped-def
     if not (keeps_course(v, s.came_v_e_m_s) and np.hypot(v[0], v[1]) >= TURNING_M_S and abs(turn_rad_s) < MOST_RAD_S):
         s.turned_rad = s.steady_s = 0.0
         return False
+    ignored = abs(s.turned_rad) > TURNED_RAD
     s.turned_rad += turn_rad_s * interval_s
     ignores = abs(s.turned_rad) > TURNED_RAD
-    s.steady_s = s.steady_s + interval_s if ignores else 0.0
+    s.steady_s = s.steady_s + interval_s if ignored and ignores else 0.0
     return ignores
 
 
