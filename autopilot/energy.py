@@ -102,6 +102,7 @@ class EnergyParams:
 
 SLOWEST, FASTEST = 0.6, 1.6  # range of a plausible airspeed over cruise
 STALL_MARGIN = 1.2
+TURN_MARGIN = 1.1
 
 
 @kernel
@@ -210,6 +211,33 @@ def least_airspeed(s, e):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
+    """The airspeed of the guards against a stall, m/s; infinite if unknown.
+
+    Measured, or from the elevator (`autopilot.lift`), or from the estimated wind, which is late and may be wrong.
+    """
+    if s.lift_m_s > 0.0 and not (s.airspeed_known and s.air_left_s > 0.0):
+        return s.lift_m_s
+    return s.airspeed_m_s if s.airspeed_known else math.inf
+
+
+@kernel
+def most_climb(s, e):  # type: ignore[no-untyped-def]
+    """Largest climb demand, m/s, that leaves the speed above the stall; infinite if the airspeed is unknown.
+
+    s : record with `airspeed_m_s`, `airspeed_known`, `lift_m_s`   e : record of EnergyParams
+    """
+    return e.climb_per_margin_1_s * (airspeed_to_protect(s) - least_airspeed(s, e)) - e.recovery_sink_m_s
+
+
+@kernel
+def steepest_bank(s, e):  # type: ignore[no-untyped-def]
+    """Largest bank, rad, of a level turn 10 % above its stalling speed, which grows with 1 / sqrt(cos bank)."""
+    slowest_m_s = TURN_MARGIN * (e.inverted_stall_m_s if s.inverted else e.stall_m_s)
+    return math.acos(min((slowest_m_s / airspeed_to_protect(s)) ** 2, 1.0))
+
+
+@kernel
 def throttle_of(energy_m_s, trim, s, e):  # type: ignore[no-untyped-def]
     """Throttle, 0..1, for an energy rate, and the rate it can deliver, m/s of climb; `trim` is for zero."""
     level = trim + s.throttle_integral
@@ -231,17 +259,17 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     s : record with `climb_integral_rad`, `throttle_integral`, updated, and the results of `believe_airspeed`
     """
     e = p.energy
+    most_m_s = most_climb(s, e)
     trim_rad, trim = level_flight(s, e)
     missing_m = height_m - height(row, p.guidance)
     climb_m_s = sinking_m_s = 0.0
     if math.isfinite(missing_m):
         climb_m_s = clip(e.climb_per_height_1_s * missing_m, -e.sink_limit_m_s, e.climb_limit_m_s)
         sinking_m_s = row.gps_v_e_m_s[2]  # velocity down
-    gain_m_s, most_m_s = 0.0, math.inf
+    gain_m_s = 0.0
     if s.airspeed_known:
         gain_m_s2 = e.gain_per_speed_1_s * (s.airspeed_wanted_m_s - s.airspeed_m_s)
         gain_m_s = s.airspeed_m_s / G_M_S2 * clip(gain_m_s2, -e.gain_limit_m_s2, e.gain_limit_m_s2)
-        most_m_s = e.climb_per_margin_1_s * (s.airspeed_m_s - least_airspeed(s, e)) - e.recovery_sink_m_s
     energy_m_s = climb_m_s + gain_m_s
     throttle, given_m_s = throttle_of(energy_m_s, trim, s, e)
     climb_m_s = min(e.height_weight * climb_m_s + (1.0 - e.height_weight) * (given_m_s - gain_m_s), most_m_s)
