@@ -76,7 +76,7 @@ WATCH = (
     Column("frozen_m", (), "distance that it should have covered"),
     Column("repeats_s", (), "time for which position and velocity have repeated"),
     Column("steady_s", (), "time for which the course has repeated in a turn"),
-    Column("turned_rad", (), "turn since the course last changed"),
+    Column("ignored_rad", (), "turn since the course last changed"),
     Column("gps_lost", (), "1 while fixes cannot be true", integer=True),
     Column("clear_s", (), "time for which they have been consistent since"),
 )
@@ -171,11 +171,11 @@ def ignores_turn(row, turn_rad_s, s, interval_s):  # type: ignore[no-untyped-def
     """Whether the course has not changed in a turn."""
     v = row.gps_v_e_m_s
     if not (keeps_course(v, s.came_v_e_m_s) and np.hypot(v[0], v[1]) >= TURNING_M_S and abs(turn_rad_s) < MOST_RAD_S):
-        s.turned_rad = s.steady_s = 0.0
+        s.ignored_rad = s.steady_s = 0.0
         return False
-    ignored = abs(s.turned_rad) > TURNED_RAD
-    s.turned_rad += turn_rad_s * interval_s
-    ignores = abs(s.turned_rad) > TURNED_RAD
+    ignored = abs(s.ignored_rad) > TURNED_RAD
+    s.ignored_rad += turn_rad_s * interval_s
+    ignores = abs(s.ignored_rad) > TURNED_RAD
     s.steady_s = s.steady_s + interval_s if ignored and ignores else 0.0
     return ignores
 
