@@ -38,10 +38,10 @@ its vertical is then `apart_rad` or more from the standby attitude, or if it is 
 been GOOD for `unhealthy_s`.
 
 The GPS counts as working while fixes arrive, even if they are 12 s late; a fix that cannot be true is none, see
-`estimator.blocks.gps_integrity`.  An estimator that is POOR for lack of fixes is handled by CIRCLE; one that was never healthy leaves no attitude to fall back on, and is flown on as it is; if it is
-no number, controls are neutral and the motor is off.  One that reports GOOD is trusted, whatever it reports.  After a
-failsafe the commanded mode continues where it was: a detected throw stays detected, a route continues to its next
-waypoint.
+`estimator.blocks.gps_integrity`.  An estimator that is POOR for lack of fixes is handled by CIRCLE; one that was never
+healthy leaves no attitude to fall back on, and is flown on as it is; if it is no number, controls are neutral and the
+motor is off.  One that reports GOOD is trusted, whatever it reports.  After a failsafe the commanded mode continues
+where it was: a detected throw stays detected, a route continues to its next waypoint.
 
 No row lasts for ever without somebody who can end it.  Without a radio link, RETURN ends in GLIDE, and so does CIRCLE;
 LEVEL ends in LAND.  With it, the pilot can: by any mode, in LEVEL by MANUAL or RATE.  A LAUNCH without a height ends by

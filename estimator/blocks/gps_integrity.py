@@ -12,7 +12,7 @@ Only horizontally: many receivers report no vertical velocity.  A fix is refused
 - if it is *frozen*: the position repeats to the last bit while the reported speed has covered 3 m, or position and
   velocity repeat for 2 s while the speed is not zero.  Frozen for 1 s, the GPS is lost.  A receiver at rest that holds
   its position reports a speed of zero and is not frozen;
-- if its course repeats to the last bit while the gyros have seen a turn of 15 degrees; for 0.75 s more, the GPS is lost;
+- if its course repeats to the last bit while the gyros have seen a turn of 15 degrees; 0.75 s later the GPS is lost;
 - while the GPS is *lost*: also if ``|r|`` exceeds its limit, when the velocity is frozen, or its course, and the
   aeroplane turns.  It is found again by consistent fixes for 2 s.
 
