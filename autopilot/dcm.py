@@ -288,7 +288,8 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     """
     me = memory[0]
     setpoint, s, p, row = me.setpoint, me.s, me.p, me.seen
-    take_in(rows[k], turn_rate(R_eb, omega_b_rad_s), row, s)
+    turning = turn_rate(R_eb, omega_b_rad_s) if s.believed else turn_rate(s.R_kept_eb, s.omega_kept_b_rad_s)
+    take_in(rows[k], turning, row, s)
     known = math.isfinite(row.dt_s)
     dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S) if known else 0.0
     for i in range(3):
