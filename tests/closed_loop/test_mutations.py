@@ -30,9 +30,11 @@ NEVER_MISSES_THE_GPS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverMissesTheGps"}
 CLIMBS_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:ClimbsOn"}
 FLIES_THROUGH_THE_FENCE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FliesThroughTheFence"}
 LOOKS_TOO_LATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:LooksAtTheFenceTooLate"}
+BELIEVES_EVERY_FIX = {"autopilot": f"{BROKEN_AUTOPILOTS}:BelievesEveryFix"}
 CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
+NEVER_TRIMS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverTrims"}
 RUDDER_STUCK = {"autopilot": f"{BROKEN_AUTOPILOTS}:RudderStuck"}
 
 
@@ -106,8 +108,11 @@ MUTATIONS = (
         "heading error of the nose, to be large",
     ),
     Mutation("launch_no_gps", "premerlani", CLIMBS_ON, "greatest height"),
+    Mutation("loiter_gps_stuck", "gyro_only", {}, "survived"),
+    Mutation("loiter_gps_stuck", "premerlani", BELIEVES_EVERY_FIX, "circled"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
+    Mutation("maiden_flight", "premerlani", NEVER_TRIMS, "off the course RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("return_to_launch_strong_wind", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("return_to_launch_strong_wind_nose", "premerlani", NO_YAW, "first within 25 m of the launch point"),
