@@ -44,6 +44,6 @@ SCENARIO = Scenario(
         Check.lowest("lowest height", "m", height_m, 35.0, STUCK),
         Check.rms("inclination error RMS, GPS stuck", "deg", inclination_error_deg, 6.0, STUCK, BACK),
         Check.rms("inclination error RMS afterwards", "deg", inclination_error_deg, 6.0, BACK),
-        Check("nearest to the centre at the end", "m", nearest_m(150.0, 180.0), 150.0),
+        Check("nearest to the centre at the end", "m", nearest_m(150.0, 180.0), 100.0),
     ),
 )

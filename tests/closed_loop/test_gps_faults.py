@@ -84,12 +84,9 @@ def test_fault_that_leaves_enough_is_flown_on(fault):
     assert inclination_deg(flight)[round(FROM_S * 50) :].max() < 15.0
 
 
-def test_spikes_lead_an_autopilot_astray_that_believes_them():
-    """The sound one sees less than a fix in ten missing."""
-    off_m = [
-        np.abs(from_centre_m(flown("spikes=200,0.3", **changes))[3000:] - 60.0).max() for changes in ({}, BELIEVES)
-    ]
-    assert off_m[0] < 40.0 < off_m[1]
+def test_autopilot_that_is_impatient_takes_fewer_fixes_for_none():
+    """Its limit is shorter than the interval of the fixes."""
+    assert len(blind_s(flown("rate=1", autopilot=f"{BROKEN}:Impatient"))) > 0
 
 
 def test_drift_leads_the_aeroplane_away_and_the_attitude_stays():
