@@ -23,8 +23,6 @@ Variants       ``bank_30``, ``bank_45``, ``bank_60``: the turns at that bank, 25
 =============  ===================================================================================================
 """
 
-from dataclasses import replace
-
 from autopilot.pilot import Script, Timed, reversals
 from scenarios.harness.checks import SURVIVED, Check
 from scenarios.harness.config import AirConfig, FlightConfig, InFlightStart
@@ -96,13 +94,10 @@ def _high() -> Scenario:
     survived, inclination, recovered = SCENARIO.checks
     checks = (
         survived,
-        replace(inclination.limited(3.0), per_flight_limit=6.0),
-        Check.rms(
-            "inclination error RMS while banked", "deg", TILT_BANKED, 3.0, SETTLED, per_flight_limit=6.0,
-            judged_share=0.05,
-        ),
+        inclination.limited(3.0),
+        Check.rms("inclination error RMS while banked", "deg", TILT_BANKED, 3.0, SETTLED, judged_share=0.05),
         recovered,
-    )  # fmt: skip
+    )
     return SCENARIO.varied("high", VARIANTS["high"], changes, checks=checks)
 
 
