@@ -116,10 +116,10 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
     s : record with `airspeed_m_s`, `airspeed_known`, `air_left_s`, updated
     """
     e = p.energy
-    measured = abs(row.airspeed_m_s) < AIRSPEED_RANGE_M_S  # False for NaN
+    measured = abs(row.equivalent_airspeed_m_s) < AIRSPEED_RANGE_M_S  # False for NaN
     s.air_left_s = e.speed_trust_s if row.air_new and measured else s.air_left_s - dt_s
     if s.air_left_s > 0.0 and measured:
-        now_m_s, s.airspeed_known = row.airspeed_m_s, 1
+        now_m_s, s.airspeed_known = row.equivalent_airspeed_m_s, 1
     else:
         now_m_s, s.airspeed_known = math.nan, 0
         lag_s = gps_age(row, p.guidance)

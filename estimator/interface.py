@@ -46,7 +46,9 @@ MEASURED = (
     Column("mag_new", (), "1 where a magnetometer sample arrived in this tick", integer=True),
     Column("mag_b_ut", (3,), "magnetic field of the last sample, microtesla"),
     Column("air_new", (), "1 where an airspeed or a barometric height arrived in this tick", integer=True),
-    Column("airspeed_m_s", (), "last measured airspeed; NaN without a pitot tube or before its first report"),
+    Column(
+        "equivalent_airspeed_m_s", (), "last airspeed, of the pitot pressure; NaN without a tube or before a report"
+    ),
     Column("baro_height_m", (), "last barometric height above the launch point; NaN likewise"),
 )
 MEASURED_DTYPE = dtype_of(MEASURED)
@@ -84,9 +86,14 @@ class MagSample(NamedTuple):
 
 
 class AirData(NamedTuple):
-    """The last air data: airspeed and barometric height above the launch point; NaN where one is not fitted."""
+    """The last air data; NaN where an instrument is not fitted.
 
-    airspeed_m_s: float
+    equivalent_airspeed_m_s : from the pitot pressure q, sqrt(2 q / 1.225 kg/m3); the true airspeed is higher in thinner
+        air, see `estimator.blocks.air`
+    height_m : barometric, above the launch point
+    """
+
+    equivalent_airspeed_m_s: float
     height_m: float
 
 
@@ -114,7 +121,7 @@ class Measurements(NamedTuple):
         if mag is not None:
             row["mag_new"], row["mag_b_ut"] = 1, mag.field_b_ut
         if air is not None:
-            row["air_new"], row["airspeed_m_s"], row["baro_height_m"] = 1, air.airspeed_m_s, air.height_m
+            row["air_new"], row["equivalent_airspeed_m_s"], row["baro_height_m"] = 1, *air
         rows.flags.writeable = False
         return cls(rows, 0)
 
@@ -144,7 +151,9 @@ class Measurements(NamedTuple):
     @property
     def air(self) -> AirData | None:
         row = self.rows[self.k]
-        return AirData(float(row["airspeed_m_s"]), float(row["baro_height_m"])) if row["air_new"] else None
+        if not row["air_new"]:
+            return None
+        return AirData(float(row["equivalent_airspeed_m_s"]), float(row["baro_height_m"]))
 
 
 class Health(IntEnum):

@@ -112,8 +112,8 @@ STATE_DTYPE = state_dtype(PremerlaniParams, *WIND_FILTER, *LAG, *_STATE)
 def take_air(row, s):  # type: ignore[no-untyped-def]
     """Take an airspeed that arrived."""
     s.air_age_s += s.dt_s
-    if s.use_airspeed and airspeed_came(row, s) and row.airspeed_m_s > 0.0:
-        s.airspeed_m_s = row.airspeed_m_s
+    if s.use_airspeed and airspeed_came(row, s) and row.equivalent_airspeed_m_s > 0.0:
+        s.airspeed_m_s = row.equivalent_airspeed_m_s
         s.air_age_s = 0.0
 
 

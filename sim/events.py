@@ -8,8 +8,8 @@ import numpy as np
 from autopilot.interface import Mode
 from autopilot.pilot import Script
 from estimator.interface import Health
+from sim.faults import Fault
 from sim.log import Event, Flight, Log, Outcome, Phase
-from sim.sensors.faults import Fault
 
 _GPS_SILENCE_S = 2.5  # the GPS counts as lost after this long without a fix
 _PHASES = {
@@ -87,7 +87,7 @@ def _radio_events(script: Script | None, release_s: float, last_s: float) -> lis
 
 
 def events_of_faults(faults: Sequence[Fault], flight: Flight) -> tuple[Event, ...]:
-    """Start and end of each sensor fault within `flight`, not before power-up."""
+    """Start and end of each fault within `flight`, not before power-up."""
     last_s = float(flight.log.truth["t_s"][-1]) if len(flight.log) else 0.0
     events = []
     for fault in faults:

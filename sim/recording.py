@@ -36,6 +36,7 @@ PARQUET = "flight.parquet"
 MANIFEST = "manifest.json"
 FORMAT = 1  # increased when an older reader would misread the columns or the record
 LARGEST_MANIFEST = 64 << 20  # bytes
+RENAMED = {"measured.airspeed_m_s": "measured.equivalent_airspeed_m_s"}  # columns of older recordings
 _KEY = b"wingslevel"
 _OWN = ("format", "outcome", "message", "heading_reference", "dt_s", "release_s", "n_ticks", "events", "sha256")
 
@@ -263,15 +264,18 @@ def _record_of(schema: pa.Schema, path: Path) -> dict[str, Any]:
 
 def _log_of(file: pq.ParquetFile, path: Path) -> Log:
     """The columns of the file, each checked; times first, so that their errors are reported first."""
-    expected, found, rows = [e.name for e in elements()], file.schema_arrow.names, file.metadata.num_rows
+    schema = file.schema_arrow
+    names = [RENAMED.get(name, name) for name in schema.names]
+    expected, found, rows = [e.name for e in elements()], names, file.metadata.num_rows
     if odd := sorted(set(expected) ^ set(found)):
         kind = "lacks" if odd[0] in expected else "has the unknown"
         raise RecordingError(f"{path} was recorded by another version: it {kind} column {files.some(odd[:1])}")
     if len(found) > len(expected):
         raise RecordingError(f"{path}: it has a column twice")
-    recording_checks.schema(file.schema_arrow, {e.name: e.column.integer for e in elements()}, rows)
+    schema = pa.schema([field.with_name(name) for field, name in zip(schema, names, strict=True)])
+    recording_checks.schema(schema, {e.name: e.column.integer for e in elements()}, rows)
     recording_checks.column("truth.t_s", file.read(columns=["truth.t_s"])["truth.t_s"], rows)
-    table, log = file.read(), Log.empty(rows)
+    table, log = file.read().rename_columns(names), Log.empty(rows)
     for e in elements():
         getattr(log, e.table)[e.column.name][(slice(None), *e.at)] = recording_checks.column(
             e.name, table[e.name], rows

@@ -1,5 +1,6 @@
 """`estimate`: plain arrays in, attitude out."""
 
+import difflib
 import warnings
 from collections.abc import Mapping
 from typing import Any, NotRequired, SupportsFloat, TypedDict
@@ -40,10 +41,10 @@ class MagArrays(TypedDict):
 
 
 class AirArrays(TypedDict):
-    """M samples of air data: `t_s` of shape (M,), true airspeed and barometric height of shape (M,)."""
+    """M samples of air data: `t_s` of shape (M,), equivalent airspeed and barometric height of shape (M,)."""
 
     t_s: ArrayLike
-    airspeed_m_s: NotRequired[ArrayLike]
+    equivalent_airspeed_m_s: NotRequired[ArrayLike]
     height_m: NotRequired[ArrayLike]
 
 
@@ -113,7 +114,7 @@ def _log(t_s: Any, gyro: Any, force: Any, gps: Any, mag: Any, air: Any) -> Any:
     _warn_of_interval(float(np.median(steps)))
     rows["dt_s"] = np.concatenate(([np.median(steps)], steps))
     rows["gyro_b_rad_s"], rows["force_b_m_s2"] = gyro_b_rad_s, force_b_m_s2
-    rows["airspeed_m_s"] = rows["baro_height_m"] = np.nan
+    rows["equivalent_airspeed_m_s"] = rows["baro_height_m"] = np.nan
     instruments = ["gyro", "accelerometer"]
     for name, given, take in (("gps", gps, _take_gps), ("magnetometer", mag, _take_mag), ("airspeed", air, _take_air)):
         if given is not None:
@@ -185,7 +186,9 @@ def _arrivals(name: str, given: Mapping[str, Any], fields: Mapping[str, int], ro
     odd = [key for key in given if key not in ("t_s", *fields)]
     if odd or "t_s" not in given:
         wrong = f"holds {odd[0]!r}" if odd else "holds no 't_s'"
-        raise WingslevelError(f"{name} {wrong}: it may hold {', '.join(('t_s', *fields))}")
+        near = difflib.get_close_matches(odd[0], fields, n=1, cutoff=0.5) if odd and isinstance(odd[0], str) else []
+        wrong += f", did you mean {near[0]!r}?" if near else ":"
+        raise WingslevelError(f"{name} {wrong} it may hold {', '.join(('t_s', *fields))}")
     t_s = _array(f"{name}['t_s']", given["t_s"], 0)
     found: dict[str, Any] = {}
     for field, width in fields.items():
@@ -250,9 +253,9 @@ def _take_mag(rows: Any, given: Any) -> None:
 
 
 def _take_air(rows: Any, given: Any) -> None:
-    found = _arrivals("air", given, {"airspeed_m_s": 0, "height_m": 0}, rows)
+    found = _arrivals("air", given, {"equivalent_airspeed_m_s": 0, "height_m": 0}, rows)
     rows["air_new"] = found["new"]
-    for field, column in (("airspeed_m_s", "airspeed_m_s"), ("height_m", "baro_height_m")):
+    for field, column in (("equivalent_airspeed_m_s", "equivalent_airspeed_m_s"), ("height_m", "baro_height_m")):
         values = _held(found, field, np.nan)
         if values is not None:
             rows[column] = values

@@ -116,7 +116,7 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
     if s.use_magnetometer and take_field(row, s):
         s.new_field, s.field_age_s = 1, 0.0
     if airspeed_came(row, s):
-        s.airspeed_m_s, s.air_age_s = max(row.airspeed_m_s, 0.0), 0.0
+        s.airspeed_m_s, s.air_age_s = max(row.equivalent_airspeed_m_s, 0.0), 0.0
 
 
 @kernel

@@ -124,9 +124,9 @@ def airspeed_came(row, s):  # type: ignore[no-untyped-def]
     """
     if not row.air_new:
         return False
-    if abs(row.airspeed_m_s) < AIRSPEED_RANGE_M_S:
+    if abs(row.equivalent_airspeed_m_s) < AIRSPEED_RANGE_M_S:
         return True
-    if s.air_age_s < np.inf or not np.isnan(row.airspeed_m_s):
+    if s.air_age_s < np.inf or not np.isnan(row.equivalent_airspeed_m_s):
         refuse(s, AIR)
     return False
 

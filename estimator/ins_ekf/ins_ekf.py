@@ -218,7 +218,7 @@ def attach_others(row, s):  # type: ignore[no-untyped-def]
     if s.use_airspeed and airspeed_came(row, s):
         s.air_age_s = 0.0
         s.w_bits[i] |= HAS_AIR
-        s.w_airspeed_m_s[i] = max(row.airspeed_m_s, 0.0)
+        s.w_airspeed_m_s[i] = max(row.equivalent_airspeed_m_s, 0.0)
 
 
 # The present

@@ -36,7 +36,7 @@ from scenarios.harness.own_files import Library
 from sim.outside.blame import Refused
 from sim.outside.wording import printable
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 FUNCTIONS = ("describe", "create", "reset", "update", "destroy")
 STATIC_STATE = 1  # bit of the description's flags
 _REFERENCES: tuple[HeadingReference, ...] = ("course", "nose")  # by number, as the header has them
@@ -63,10 +63,11 @@ class _Description(ctypes.Structure):
     )  # fmt: skip
 
 
-# The columns of ``wingslevel_measurements`` of version 1, in its order.
+# The columns of ``wingslevel_measurements`` in its order; version 2 renamed the airspeed, in its place.
 _COLUMNS = (
     "t_s", "dt_s", "gyro_b_rad_s", "force_b_m_s2", "gps_new", "gps_valid", "gps_t_s", "gps_p_e_m", "gps_v_e_m_s",
-    "gps_course_rad", "gps_speed_m_s", "mag_new", "mag_b_ut", "air_new", "airspeed_m_s", "baro_height_m",
+    "gps_course_rad", "gps_speed_m_s", "mag_new", "mag_b_ut", "air_new",
+    "equivalent_airspeed_m_s", "baro_height_m",
 )  # fmt: skip
 MEASUREMENTS = np.dtype(
     [("struct_size", "u4"), ("reserved", "u4"), *((name, MEASURED_DTYPE[name]) for name in _COLUMNS)], align=True

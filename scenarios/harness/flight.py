@@ -23,12 +23,12 @@ from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario, ScriptFailed
 from sim.clock import Rates
 from sim.events import events_of_faults
+from sim.faults import Fault, of_family
 from sim.log import Event, Flight, Log, Outcome
 from sim.loop import Watch, fly
 from sim.params import near_misses
 from sim.power_up import sample_at_rest
 from sim.recording import plain
-from sim.sensors.faults import Fault
 from sim.sensors.fitting import SuiteParams
 from sim.sensors.suite import Suite
 
@@ -85,7 +85,7 @@ class Prepared:
         on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight) if airborne else None
         flown = fly(
             plant,
-            Suite(self.suite, rates, config.seed, config.flight, faults, plant.release_s),
+            Suite(self.suite, rates, config.seed, config.flight, of_family("sensor", faults), plant.release_s),
             self.estimator.code,
             self.autopilot.code,
             self.script,

@@ -402,7 +402,7 @@ def _truth_of(log: RecordedLog, truth: NDArray[Any]) -> None:
     truth["phase"] = Phase.FLYING
     for name in _UNKNOWN:
         truth[name] = np.nan
-    truth["airspeed_m_s"] = np.where(rows["air_new"] > 0, rows["airspeed_m_s"], np.nan)
+    truth["airspeed_m_s"] = np.where(rows["air_new"] > 0, rows["equivalent_airspeed_m_s"], np.nan)
     truth["R_eb"] = np.eye(3)
     if log.reference is not None:
         known = log.reference.known

@@ -180,7 +180,7 @@ def measure_air(truth, measured, noise, k, unit, memory):  # type: ignore[no-unt
     """Hold the last samples in row `k`, or write new ones; `unit` and `memory` are records of UNIT and MEMORY."""
     row, spt = measured[k], unit.steps_per_tick
     row.air_new = 0
-    row.airspeed_m_s = measured[k - 1].airspeed_m_s if k > 0 else np.nan
+    row.equivalent_airspeed_m_s = measured[k - 1].equivalent_airspeed_m_s if k > 0 else np.nan
     row.baro_height_m = measured[k - 1].baro_height_m if k > 0 else np.nan
     older, newer = truth[max(k - 1, 0)], truth[k]
     if unit.airspeed_steps:
@@ -188,7 +188,7 @@ def measure_air(truth, measured, noise, k, unit, memory):  # type: ignore[no-unt
         if step > k * spt:
             late = (step - k * spt) / spt  # fraction of the tick, 0 < late <= 1
             speed = (1.0 - late) * _felt_m_s(older, unit) + late * _felt_m_s(newer, unit)
-            row.airspeed_m_s = _airspeed_m_s(speed, noise[k].airspeed_noise_pa, unit)
+            row.equivalent_airspeed_m_s = _airspeed_m_s(speed, noise[k].airspeed_noise_pa, unit)
             row.air_new = 1
     if unit.baro_steps:
         _lag(-older.p_e_m[2], -newer.p_e_m[2], k, unit, memory)

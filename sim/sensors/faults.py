@@ -4,27 +4,21 @@ Faults act on the sensor outputs in the order given and may overlap: bias and ga
 repeats the last output before its window, other faults included.  For a sensor slower than the loop (GPS,
 magnetometer, air data) a fault acts on the reports that arrive in its window, not on values held between reports.
 
-stuck           repeats the last report before the window; a GPS repeats its fix with new time stamps, or gives no
-                fix if it had none
+stuck           repeats the last report before the window
 dropout         no data: gyro, accelerometer and air data read zero, a magnetometer gives no new sample
-outage          no data from a GPS: no new fix, the last good one is held
 nan             readings are NaN
-spikes          a fraction of the readings is off by an amplitude, up or down; of a GPS, its position in any direction
+spikes          a fraction of the readings is off by an amplitude, up or down
 bias, gain      readings are offset by an amount, or multiplied by a factor
 saturated       reads full scale, or the overflow value if the part has one; a barometer saturates in pressure, so
                 that 1 reads low
-jump            the position of the fixes is displaced
-frozen_course   fixes keep the last reported course, 0 before the first, and their velocity points along it
 
-Faulty readings stay within the full scale of the part, or overflow as the part does.
+Those of a GPS are in `sim.sensors.gps_faults`.  Faulty readings stay within the full scale of the part, or overflow
+as the part does.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from decimal import Decimal
-from enum import IntEnum
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,25 +29,12 @@ from sim import params
 from sim.clock import Rates
 from sim.sensors.air_data import height_at_m
 from sim.sensors.device import quantise
+from sim.sensors.fault_kinds import Kind
+from sim.sensors.gps_faults import BY_AXIS, DEFAULTS, OF_FIXES, UNITS, spoil_fix, why_impossible, why_no_such_rate
 from sim.sensors.noise import Source
-from sim.sensors.receiver import hold
 
-LATEST_S: Final = 36000.0
-
-
-class Kind(IntEnum):
-    """Kinds of fault, by their code in the kernel."""
-
-    STUCK = 1  # 0: no fault
-    DROPOUT = 2
-    NAN = 3
-    SPIKES = 4
-    BIAS = 5
-    GAIN = 6
-    SATURATED = 7
-    OUTAGE = 8
-    JUMP = 9
-    FROZEN_COURSE = 10
+if TYPE_CHECKING:
+    from sim.faults import Fault
 
 
 class _Part(NamedTuple):
@@ -79,7 +60,6 @@ _PARTS: Final = {
 }
 _AIR: Final = ("airspeed", "barometer")
 _OF_READINGS: Final = ("stuck", "dropout", "nan", "spikes", "bias", "gain", "saturated")
-_OF_FIXES: Final = ("outage", "jump", "frozen_course", "stuck", "nan", "spikes")
 CHANNELS: Final = tuple(
     name for part, of in _PARTS.items() for name in (part, *(f"{part}.{axis}" for axis in "xyz" if of.axes == 3))
 )
@@ -88,96 +68,42 @@ CHANNELS: Final = tuple(
 def kinds_of(channel: str) -> tuple[str, ...]:
     """Kinds of fault of one of the CHANNELS."""
     if channel == "gps":
-        return _OF_FIXES
+        return OF_FIXES
     if channel.startswith("magnetometer."):
         return tuple(kind for kind in _OF_READINGS if kind != "dropout")  # its axes arrive together
     return _OF_READINGS
 
 
 def defaults_of(channel: str, kind: str) -> tuple[float, ...]:
-    """Default values of a fault, as many as it takes."""
+    """Default values of a fault, as many as it takes, in deg/s, g, uT, m/s, m or Hz.
+
+    spikes: amplitude, fraction of the readings; bias: amount; gain: factor; saturated: +1 or -1; jump and drift:
+    north, east; rate
+    """
     part = _PARTS[channel.partition(".")[0]]
-    values = {"spikes": part.spikes, "bias": (part.bias,), "gain": (0.5,), "saturated": (1.0,), "jump": (50.0, 0.0)}
+    values = {"spikes": part.spikes, "bias": (part.bias,), "gain": (0.5,), "saturated": (1.0,), **DEFAULTS}
     return values.get(kind, ())
 
 
-def unit_of(channel: str) -> str:
-    """Unit of bias, spikes and jumps of `channel`."""
-    return _PARTS[channel.partition(".")[0]].unit
+def unit_of(channel: str, kind: str = "") -> str:
+    """Unit of the values of a fault of `channel`, except the fraction of spikes and the factor of gain."""
+    return UNITS.get(kind, _PARTS[channel.partition(".")[0]].unit)
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
-    """One fault.  Its text ``channel:kind=values@from-to``, as typed by users, also names its random stream.
+def wrong_values(_channel: str, kind: str, values: tuple[float, ...]) -> str:
+    """What would be right, if the finite values of a fault are not."""
+    if kind == "saturated" and abs(values[0]) != 1.0:
+        return "must be 1, the upper end of the full scale, or -1, the lower"
+    if kind == "spikes" and not 0.0 < values[1] <= 1.0:
+        return "the second value is the fraction of the readings, above 0 and at most 1"
+    return why_impossible(kind, values)
 
-    channel : one of CHANNELS                       kind : one of `kinds_of` the channel
-    values : spikes: amplitude, fraction of the readings; bias: amount; gain: factor; saturated: +1 or -1; jump:
-        metres north, east.  In deg/s, g, uT, m/s or m; `defaults_of` fills in missing ones
-    from_s, to_s : since the release; affects readings at from_s <= t < to_s, to the end if to_s is infinite
+
+def require_possible(fault: "Fault", suite: Any, gps_hz: float | None = None) -> None:
+    """Reject a fault that the parts of `suite` cannot have: ValueError.
+
+    gps_hz : rate of the GPS; None is the rate of the receiver
     """
-
-    channel: str
-    kind: str
-    values: tuple[float, ...] = ()
-    from_s: float = -LATEST_S
-    to_s: float = math.inf
-
-    def __post_init__(self) -> None:
-        if self.channel not in CHANNELS:
-            raise ValueError(f"fault of {self.channel!r}: choose from {', '.join(CHANNELS)}")
-        if self.kind not in kinds_of(self.channel):
-            raise ValueError(f"fault of {self.channel}: {self.kind!r}: choose from {', '.join(kinds_of(self.channel))}")
-        given = tuple(float(value) for value in self.values)
-        defaults = defaults_of(self.channel, self.kind)
-        if len(given) > len(defaults):
-            takes = f"at most {len(defaults)} values" if defaults else "no value"
-            raise ValueError(f"{self.what} = {_numbers(given)}: takes {takes}")
-        object.__setattr__(self, "values", given + defaults[len(given) :])
-        self._check_values()
-        if not (abs(self.from_s) <= LATEST_S and self.from_s < self.to_s and self.to_s > -LATEST_S):
-            raise ValueError(
-                f"{self.what} from {self.from_s!r} to {self.to_s!r} s: must begin within {LATEST_S:g} s of the release "
-                "and end later than it begins"
-            )
-
-    def _check_values(self) -> None:
-        shown = f"{self.what} = {_numbers(self.values)}"
-        if not all(math.isfinite(value) for value in self.values):
-            raise ValueError(f"{shown}: must be finite, in {unit_of(self.channel)}")
-        if self.kind == "saturated" and abs(self.values[0]) != 1.0:
-            raise ValueError(f"{shown}: must be 1, the upper end of the full scale, or -1, the lower")
-        if self.kind == "spikes" and not 0.0 < self.values[1] <= 1.0:
-            raise ValueError(f"{shown}: the second value is the fraction of the readings, above 0 and at most 1")
-
-    @property
-    def part(self) -> str:
-        """Name of the sensor in the suite."""
-        return self.channel.partition(".")[0]
-
-    @property
-    def what(self) -> str:
-        """Channel and kind."""
-        return f"{self.channel}:{self.kind}"
-
-    def __str__(self) -> str:
-        values = f"={_numbers(self.values)}" if self.values else ""
-        end = f"-{_number(self.to_s)}" if math.isfinite(self.to_s) else ""
-        return f"{self.what}{values}@{_number(self.from_s)}{end}"
-
-
-def _number(value: float) -> str:
-    """Shortest decimal without exponent that parses to `value`."""
-    if not math.isfinite(value):
-        return str(value)
-    return format(Decimal(repr(float(value))), "f").removesuffix(".0")
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return ",".join(_number(value) for value in values)
-
-
-def require_possible(fault: Fault, suite: Any) -> None:
-    """Reject a fault of a part not fitted in `suite`, or saturation of a part without full scale: ValueError."""
     part = getattr(suite, fault.part)
     if part is None:
         raise ValueError(f"fault {fault}: no {fault.part} fitted; choose a suite that has one")
@@ -188,6 +114,8 @@ def require_possible(fault: Fault, suite: Any) -> None:
             f"fault {fault}: this {fault.part} has no full scale; set {field} to a finite number of "
             f"{params.unit_of(field)}, choose a suite whose {fault.part} has one, or use bias"
         )
+    if fault.kind == "rate" and (why := why_no_such_rate(fault.values[0], gps_hz or part.rate_hz)):
+        raise ValueError(f"fault {fault}: {why}")
 
 
 FAULT = np.dtype(
@@ -208,7 +136,7 @@ NO_FAULTS = np.zeros((0, 0), FAULT)
 
 
 def fault_table(
-    faults: Sequence[Fault], release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
+    faults: Sequence["Fault"], release_s: float, rates: Rates, source: Source, unit: NDArray[np.void], n: int
 ) -> NDArray[np.void]:
     """Faults of each of `n` ticks, shape (n, m) of FAULT, a column per axis of each fault; or NO_FAULTS.
 
@@ -242,12 +170,12 @@ def _first_tick(t_s: float, imu_hz: float, n: int) -> int:
     return n if math.isinf(t_s) else min(max(math.ceil(t_s * imu_hz - 1e-9) - 1, 0), n)
 
 
-def _columns(fault: Fault, source: Source, n: int) -> list[tuple[Fault, int, Array]]:
+def _columns(fault: "Fault", source: Source, n: int) -> list[tuple["Fault", int, Array]]:
     """Each axis of a fault, with its SI value in each of `n` ticks."""
     part, letter = _PARTS[fault.part], fault.channel.partition(".")[2]
     axes = ["xyz".index(letter)] if letter else list(range(part.axes))
-    if fault.kind == "jump":
-        return [(fault, axis, np.full(n, metres)) for axis, metres in enumerate(fault.values)]
+    if fault.kind in BY_AXIS:
+        return [(fault, axis, np.full(n, value)) for axis, value in enumerate(fault.values)]
     if fault.kind == "spikes":
         amplitude, share = fault.values
         axes = [0, 1] if fault.part == "gps" else axes
@@ -316,11 +244,11 @@ def spoil(truth, measured, k, faults):  # type: ignore[no-untyped-def]
             else:
                 row.mag_b_ut[i] = _wrong(row.mag_b_ut[i], before.mag_b_ut[i], fault)
         elif fault.part == _AIRSPEED:
-            row.airspeed_m_s = _wrong(row.airspeed_m_s, before.airspeed_m_s, fault)
+            row.equivalent_airspeed_m_s = _wrong(row.equivalent_airspeed_m_s, before.equivalent_airspeed_m_s, fault)
         elif fault.part == _BAROMETER:
             row.baro_height_m = _wrong(row.baro_height_m, before.baro_height_m, fault)
         elif fault.part == _GPS and row.gps_new:
-            _spoil_fix(measured, k, fault)
+            spoil_fix(measured, k, fault)
 
 
 @kernel
@@ -346,26 +274,3 @@ def _wrong_bias(bias, fault):  # type: ignore[no-untyped-def]
     if fault.kind == Kind.BIAS:
         return bias + fault.value
     return bias * fault.value if fault.kind == Kind.GAIN else bias
-
-
-@kernel
-def _spoil_fix(measured, k, fault):  # type: ignore[no-untyped-def]
-    """Apply a fault to the fix that arrives in row `k`; the columns hold it until the next fix."""
-    row, before = measured[k], measured[fault.before]
-    if fault.kind == Kind.OUTAGE or (fault.kind == Kind.STUCK and not before.gps_valid):
-        row.gps_new = 0
-        hold(measured[k - 1], row)  # no fix arrives in row 0
-    elif fault.kind == Kind.STUCK:
-        stamp_s = row.gps_t_s
-        hold(before, row)
-        row.gps_t_s = stamp_s
-    elif fault.kind == Kind.NAN:
-        for i in range(3):
-            row.gps_p_e_m[i] = row.gps_v_e_m_s[i] = np.nan
-        row.gps_course_rad = row.gps_speed_m_s = np.nan
-    elif fault.kind == Kind.FROZEN_COURSE:
-        row.gps_course_rad = before.gps_course_rad
-        row.gps_v_e_m_s[0] = row.gps_speed_m_s * np.cos(row.gps_course_rad)
-        row.gps_v_e_m_s[1] = row.gps_speed_m_s * np.sin(row.gps_course_rad)
-    else:  # jump or spike
-        row.gps_p_e_m[fault.axis] += fault.value

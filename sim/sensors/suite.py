@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from estimator.compiler.jit import kernel
 from estimator.interface import MEASURED_DTYPE, Measurements
 from sim.clock import Rates
+from sim.faults import Fault
 from sim.log import TRUTH_DTYPE, Log
 from sim.rng import stream
 from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
 from sim.sensors.accelerometer import measure_force
 from sim.sensors.air_data import measure_air
 from sim.sensors.board import attend
-from sim.sensors.faults import NO_FAULTS, Fault, fault_table, require_possible, spoil
+from sim.sensors.faults import NO_FAULTS, fault_table, require_possible, spoil
 from sim.sensors.fitting import SUITES as SUITES
 from sim.sensors.fitting import SuiteParams as SuiteParams
 from sim.sensors.gyro import measure_rate
@@ -63,7 +64,7 @@ class Suite:
         release_s: float = 0.0,
     ) -> None:  # fmt: skip
         for fault in faults:
-            require_possible(fault, params)
+            require_possible(fault, params, rates.gps_hz)
         for what in ("magnetometer", "airspeed", "barometer"):
             part = getattr(params, what)
             if part is not None:

@@ -417,5 +417,5 @@ def air_errors(log: Log, kind: str) -> Array:
     new = log.measured["air_new"] == 1
     truth, measured = log.truth[new], log.measured[new]
     if kind == "airspeed":
-        return np.asarray(measured["airspeed_m_s"] - truth["airspeed_m_s"])
+        return np.asarray(measured["equivalent_airspeed_m_s"] - truth["airspeed_m_s"])
     return np.asarray(measured["baro_height_m"] + truth["p_e_m"][:, 2])

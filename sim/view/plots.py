@@ -97,7 +97,7 @@ def curves(log: Log, heading_reference: HeadingReference) -> dict[str, Array]:
     )
     fixed = measured["gps_valid"] > 0
     sampled, aired = np.cumsum(measured["mag_new"]) > 0, np.cumsum(measured["air_new"]) > 0
-    pitot_m_s, baro_m = (np.where(aired, measured[c], np.nan) for c in ("airspeed_m_s", "baro_height_m"))
+    pitot_m_s, baro_m = (np.where(aired, measured[c], np.nan) for c in ("equivalent_airspeed_m_s", "baro_height_m"))
     # Headings around north are shown from -180 to 180, around south from 0 to 360, to avoid wrapping.
     cut_rad = -np.pi if np.mean(truth["R_eb"][:, 0, 0]) > 0.0 else 0.0
     bank_rad = flown["bank_demand_rad"], true_rad[0], estimated_rad[0]

@@ -16,10 +16,10 @@ from estimator.premerlani import Premerlani, PremerlaniParams
 from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.air import Air
 from sim.clock import Rates
+from sim.faults import Fault
 from sim.log import Flight, Log, Outcome
 from sim.loop import fly
 from sim.plant import InFlight
-from sim.sensors.faults import Fault
 from sim.sensors.suite import SUITES, Suite
 
 AHEAD = Setpoint(Mode.COURSE, height_m=100.0)

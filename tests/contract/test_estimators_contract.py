@@ -56,7 +56,7 @@ def everything_fitted(n=N):
     rows["gps_course_rad"], rows["gps_speed_m_s"] = course, 12.0
     rows["gps_v_e_m_s"] = np.stack([12.0 * np.cos(course), 12.0 * np.sin(course), 0.0 * course], axis=1)
     rows["gps_p_e_m"] = np.cumsum(0.02 * rows["gps_v_e_m_s"], axis=0)
-    rows["air_new"][::5], rows["airspeed_m_s"], rows["baro_height_m"] = 1, 13.0, 40.0
+    rows["air_new"][::5], rows["equivalent_airspeed_m_s"], rows["baro_height_m"] = 1, 13.0, 40.0
     return rows
 
 

@@ -21,8 +21,8 @@ SPOILT = {  # what is spoilt: the instrument it counts for, the flag that announ
     "field of a transformer": ("magnetometer", "mag_new", ("mag_b_ut",), 5000.0),
     "field that overflowed": ("magnetometer", "mag_new", ("mag_b_ut",), -4096 / 13.0),
     "field of zero": ("magnetometer", "mag_new", ("mag_b_ut",), 0.0),
-    "airspeed of NaN": ("airspeed", "air_new", ("airspeed_m_s",), np.nan),
-    "airspeed of infinity": ("airspeed", "air_new", ("airspeed_m_s",), np.inf),
+    "airspeed of NaN": ("airspeed", "air_new", ("equivalent_airspeed_m_s",), np.nan),
+    "airspeed of infinity": ("airspeed", "air_new", ("equivalent_airspeed_m_s",), np.inf),
 }
 
 
@@ -53,7 +53,7 @@ def steady_flight():
     rows["gps_v_e_m_s"], rows["gps_speed_m_s"] = [12.0, 0.0, 0.0], 12.0
     rows["gps_p_e_m"][:, 0] = 12.0 * rows["t_s"]
     rows["mag_new"][::5], rows["mag_b_ut"] = 1, [19.0, 0.0, 45.0]
-    rows["air_new"][::5], rows["airspeed_m_s"], rows["baro_height_m"] = 1, 12.0, 40.0
+    rows["air_new"][::5], rows["equivalent_airspeed_m_s"], rows["baro_height_m"] = 1, 12.0, 40.0
     return rows
 
 
@@ -108,7 +108,7 @@ def test_refused_counts_samples_and_rejected_counts_ticks(made):
 def test_airspeed_of_nan_before_the_first_is_no_pitot_tube(made):
     """A barometer alone reports air data whose airspeed is NaN: nothing was refused."""
     rows = steady_flight()
-    rows["airspeed_m_s"] = np.nan
+    rows["equivalent_airspeed_m_s"] = np.nan
     fly(made, rows)
     assert made.refused == {}
 
@@ -116,7 +116,7 @@ def test_airspeed_of_nan_before_the_first_is_no_pitot_tube(made):
 def test_airspeed_below_zero_is_no_refusal(made):
     """A pitot tube reads a little below zero at rest, and where the wind comes from behind."""
     rows = steady_flight()
-    rows["airspeed_m_s"][BAD:] = -0.5
+    rows["equivalent_airspeed_m_s"][BAD:] = -0.5
     fly(made, rows)
     assert made.refused == {}
 

@@ -175,7 +175,7 @@ def test_suite_at_every_rate_reports_all_channels_alive_and_finite(name, physics
     first, last = fitted.gps.first_fix_s, seconds - fitted.gps.latency_s
     assert rows["gps_new"].sum() == np.sum((true_at >= first - 1e-9) & (true_at <= last + 1e-9)) > 0
     assert_alive(rows, "mag_new", "mag_b_ut", fitted.magnetometer, seconds)
-    assert_alive(rows, "air_new", "airspeed_m_s", fitted.airspeed, seconds)
+    assert_alive(rows, "air_new", "equivalent_airspeed_m_s", fitted.airspeed, seconds)
     assert_alive(rows, "air_new", "baro_height_m", fitted.barometer, seconds)
     if fitted.magnetometer is None:
         np.testing.assert_array_equal(rows["mag_new"], 0)

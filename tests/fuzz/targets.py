@@ -291,7 +291,7 @@ def recorded() -> Flight:
     rows["dt_s"], rows["gyro_b_rad_s"], rows["force_b_m_s2"] = 0.02, FLIGHT.rate[:60], FLIGHT.force[:60]
     rows["gps_new"][::10], rows["gps_valid"], rows["gps_v_e_m_s"][:, 0] = 1, 1, 14.0
     rows["gps_speed_m_s"], rows["gps_t_s"], rows["mag_new"][::5] = 14.0, rows["t_s"], 1
-    rows["mag_b_ut"], rows["air_new"][::5], rows["airspeed_m_s"] = (21.0, 1.0, 43.0), 1, 13.0
+    rows["mag_b_ut"], rows["air_new"][::5], rows["equivalent_airspeed_m_s"] = (21.0, 1.0, 43.0), 1, 13.0
     log.truth["R_eb"], log.truth["phase"], log.truth["v_e_m_s"][:, 0] = FLIGHT.R_eb[:60], Phase.FLYING, 14.0
     manifest = {
         "scenario": "hand_launch",

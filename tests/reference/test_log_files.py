@@ -116,7 +116,9 @@ def check_others(log, path):
         good = [m for m in arsp if m["H"] and m["U"]]
         at = rows_of(columns(good, "t")[:, 0], rows)
         assert np.flatnonzero(rows["air_new"]).tolist() == at.tolist()
-        np.testing.assert_allclose(rows["airspeed_m_s"][at], columns(good, "Airspeed")[:, 0], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(
+            rows["equivalent_airspeed_m_s"][at], columns(good, "Airspeed")[:, 0], rtol=0, atol=1e-9
+        )
     elif arsp:
         assert log.ledger["airspeed"].left_out == {"ARSPD_USE is 0": len(arsp)}
     baro = [m for m in messages(path, "BARO") if rows["t_s"][0] - rows["dt_s"][0] < m["t"] <= rows["t_s"][-1]]

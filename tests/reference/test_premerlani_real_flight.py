@@ -36,7 +36,7 @@ def flight():
     rows["gps_new"][1:] = (np.diff(data.vn) != 0.0) | (np.diff(data.ve) != 0.0)
     rows["gps_course_rad"] = np.arctan2(data.ve, data.vn) % (2.0 * np.pi)
     rows["gps_speed_m_s"] = np.hypot(data.vn, data.ve)
-    rows["air_new"], rows["airspeed_m_s"] = 1, data.ias
+    rows["air_new"], rows["equivalent_airspeed_m_s"] = 1, data.ias
     airborne = rows["gps_speed_m_s"] > AIRBORNE_M_S
     return rows[1:], from_euler(data.phi, data.theta, data.psi)[1:], airborne[1:]
 

@@ -62,7 +62,7 @@ class LoggedFlight:
                 rows["mag_new"][k], rows["mag_b_ut"][k:] = 1, self.field[i]
             for i in np.flatnonzero((self.air_us > t_us - 20_000) & (self.air_us <= t_us)):
                 rows["air_new"][k] = 1
-                rows["airspeed_m_s"][k:], rows["baro_height_m"][k:] = self.airspeed[i], self.height[i]
+                rows["equivalent_airspeed_m_s"][k:], rows["baro_height_m"][k:] = self.airspeed[i], self.height[i]
         return rows
 
     def log(self) -> RecordedLog:

@@ -44,7 +44,7 @@ def fly(euler_rad, v_e_m_s, *, hz=50, gps_every=10, wind_e_m_s=(0.0, 0.0, 0.0), 
         field_e = [20.0 * np.cos(DECLINATION_RAD), 20.0 * np.sin(DECLINATION_RAD), 44.0]
         rows["mag_b_ut"] = attitude[1:].inv().apply(field_e)
     if airspeed_m_s is not None:
-        rows["air_new"], rows["airspeed_m_s"] = 1, airspeed_m_s
+        rows["air_new"], rows["equivalent_airspeed_m_s"] = 1, airspeed_m_s
     return rows, attitude[1:].as_matrix()
 
 

@@ -143,7 +143,7 @@ def test_estimate_takes_your_own_class() -> None:
         t_s, gyro, force, estimator=Mine, calibration_s=0.0,
         gps={"t_s": [5.0, 6.0, 6.999], "v_e_m_s": [[3, 4, 0], [np.nan] * 3, [3, 4, 0]]},
         mag={"t_s": [8.0], "field_b_ut": [[20, 0, 40]]},
-        air={"t_s": [9.0], "airspeed_m_s": [12.0]},
+        air={"t_s": [9.0], "equivalent_airspeed_m_s": [12.0]},
     )  # fmt: skip
     assert seen == [(249, "gps"), (349, "gps"), (399, "mag"), (449, "air")]
     np.testing.assert_array_equal(found.gyro_bias_b_rad_s[-1], [0.1, 0.2, 0.3])

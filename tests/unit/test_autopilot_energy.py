@@ -50,7 +50,7 @@ def row_of(height_m=50.0, v_e_m_s=(0.0, 0.0, 0.0), *, valid=1, airspeed_m_s=math
     row["t_s"], row["gps_t_s"], row["gps_valid"] = 10.0, 9.7, valid
     row["gps_v_e_m_s"] = v_e_m_s
     row["gps_p_e_m"] = (0.0, 0.0, -height_m - 1.3 * v_e_m_s[2])  # the fix is 1.3 s old
-    row["airspeed_m_s"], row["air_new"] = airspeed_m_s, math.isfinite(airspeed_m_s)
+    row["equivalent_airspeed_m_s"], row["air_new"] = airspeed_m_s, math.isfinite(airspeed_m_s)
     return row
 
 

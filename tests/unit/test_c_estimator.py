@@ -388,9 +388,9 @@ def test_row_beyond_the_log_is_no_read_beyond_it(level):
 @pytest.mark.parametrize(
     ("macros", "says"),
     [
-        ({"VERSION": "2"}, "level.so is built for version 2 of the interface, not 1: rebuild it with the header"),
+        ({"VERSION": "3"}, "level.so is built for version 3 of the interface, not 2: rebuild it with the header"),
         ({"VERSION": "0"}, "is built for version 0"),
-        ({"FOUND": "NULL"}, "level.so does not offer version 1 of the interface"),
+        ({"FOUND": "NULL"}, "level.so does not offer version 2 of the interface"),
         ({"SIZE": "8"}, "describes itself in 8 and 32 bytes, too few"),
         ({"REFERENCE": "7"}, "heading_reference is 7; it must be 0 (course) or 1 (nose)"),
         ({"USES": "64"}, "uses is 0x40; it must be made of the bits of gyro"),

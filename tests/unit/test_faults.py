@@ -11,15 +11,17 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from estimator.interface import MEASURED_DTYPE
-from scenarios.harness.config import FlightConfig, override, resolve
+from scenarios.harness.config import BenchStart, FlightConfig, override, resolve
 from scenarios.harness.config.faults import parse_fault
 from sim.clock import Rates
+from sim.faults import CHANNELS as EVERY_CHANNEL
+from sim.faults import Fault, family_of
 from sim.log import TRUTH_DTYPE, Log
 from sim.place import ELEVATION_M
 from sim.rng import stream
 from sim.sensors.air_data import AirspeedParams, BarometerParams, density_kg_m3
 from sim.sensors.datasheet import load_part
-from sim.sensors.faults import CHANNELS, Fault, fault_table, kinds_of, spoil
+from sim.sensors.faults import CHANNELS, fault_table, spoil
 from sim.sensors.magnetometer import MagnetometerParams
 from sim.sensors.suite import SUITES, Suite, SuiteParams
 
@@ -29,7 +31,7 @@ IN = slice(99, 149)  # the rows whose intervals end at 1 s <= t < 2 s after the 
 WINDOW = "@1-2"
 COLUMN = {
     "gyro": "gyro_b_rad_s", "accelerometer": "force_b_m_s2", "magnetometer": "mag_b_ut",
-    "airspeed": "airspeed_m_s", "barometer": "baro_height_m",
+    "airspeed": "equivalent_airspeed_m_s", "barometer": "baro_height_m",
 }  # fmt: skip
 SI = {"gyro": math.radians(1.0), "accelerometer": 9.80665, "magnetometer": 1.0, "airspeed": 1.0, "barometer": 1.0}
 FITTED = SuiteParams(
@@ -134,6 +136,12 @@ READINGS = [c for c in CHANNELS if c != "gps"]
         ("gps:jump=30,-40@10", Fault("gps", "jump", (30.0, -40.0), 10.0)),
         ("gps:jump=30@10", Fault("gps", "jump", (30.0, 0.0), 10.0)),
         ("gps:frozen_course@10", Fault("gps", "frozen_course", (), 10.0)),
+        ("aileron:stuck@20-", Fault("aileron", "stuck", (), 20.0)),
+        ("Aileron:stuck=-.3@20-25", Fault("aileron", "stuck", (-0.3,), 20.0, 25.0)),
+        ("elevator:slow@5", Fault("elevator", "slow", (0.5,), 5.0)),
+        ("rudder:slack=0.2@5", Fault("rudder", "slack", (0.2,), 5.0)),
+        ("motor:dead@30-", Fault("motor", "dead", (), 30.0)),
+        ("throttle:weak@30", Fault("motor", "weak", (0.6,), 30.0)),
     ],
 )
 def test_parse_fault_of_what_people_type(text, fault):
@@ -155,16 +163,37 @@ def test_parse_fault_of_what_people_type(text, fault):
         ("gps.x:jump@3", "did you mean gps"),
         ("gyro:stick@3", "did you mean stuck"),
         ("gyro:jump@3", "gyro has no fault 'jump'"),
-        ("gps:bias@3", "choose from frozen_course, jump, nan, outage, spikes, stuck"),
+        (
+            "gps:bias@3",
+            "choose from drift, frozen_course, frozen_position, frozen_velocity, jump, nan, outage, rate, spikes, "
+            "stuck, whole_degrees",
+        ),
+        ("gps:rate=0@3", "must be at least 0.1 Hz; for no fixes use outage"),
+        ("gps:rate=-2@3", "must be at least 0.1 Hz"),
+        ("gps:drift=0,-200@3", "must be at most 100 m/s north and east"),
+        ("gps:drift=nan@3", "'nan' is not a number"),
+        ("gps:frozen_velocity=3@3", "takes no value"),
+        ("gps:frozen@3", "did you mean"),
         ("mag.x:dropout@3", "magnetometer.x has no fault 'dropout'"),
         ("gyro:stuck=3@3", "takes no value"),
-        ("gyro:bias=1,2@3", "at most 1 values"),
+        ("gyro:bias=1,2@3", "at most 1 value"),
         ("gyro:bias=nan@3", "'nan' is not a number"),
         ("gyro:spikes=100,2@3", "above 0 and at most 1"),
         ("gyro:saturated=0.5@3", "must be 1, the upper end of the full scale, or -1"),
         ("gyro:stuck@5-5", "end later than it begins"),
         ("gyro:stuck@5-3", "end later than it begins"),
         ("gyro:stuck@99999", "within 36000 s of the release"),
+        ("ailron:stuck@3", "did you mean aileron"),
+        ("motor:lost@3", "motor has no fault 'lost'; choose from dead, stuck, weak"),
+        ("motor:ded@3", "did you mean dead"),
+        ("rudder:reverse@3", "did you mean reversed"),
+        ("rudder:reversed=1@3", "takes no value"),
+        ("aileron:stuck=1.5@3", "must be from -1 to 1, in fractions of full deflection"),
+        ("aileron:stuck=0,1@3", "at most 1 value"),
+        ("motor:stuck=-0.1@3", "must be from 0 to 1, in fractions of full throttle"),
+        ("elevator:slow=0@3", "must be above 0 and at most 100, in full deflections per second"),
+        ("elevator:slack=-1@3", "must be from 0 to 2, in fractions of full deflection"),
+        ("motor:weak=1.2@3", "must be from 0 to 1, in fractions of the voltage"),
     ],
 )
 def test_parse_fault_of_what_cannot_be_is_refused_in_one_line(text, words):
@@ -191,10 +220,16 @@ def test_parse_fault_of_any_text_is_a_fault_or_a_value_error(text):
 @given(st.data())
 def test_text_of_any_fault_reads_back_as_the_fault(data):
     """What the manifest keeps is the whole fault, to the last bit of every number."""
-    channel = data.draw(st.sampled_from(CHANNELS))
-    kind = data.draw(st.sampled_from(kinds_of(channel)))
+    channel = data.draw(st.sampled_from(EVERY_CHANNEL))
+    kind = data.draw(st.sampled_from(family_of(channel).kinds_of(channel)))
     finite = st.floats(-1e9, -1e-12) | st.just(0.0) | st.floats(1e-12, 1e9)
     takes = {"spikes": [finite, st.floats(1e-6, 1.0)], "bias": [finite], "gain": [finite], "jump": [finite, finite]}
+    fraction = st.just(0.0) | st.floats(1e-6, 1.0)
+    takes |= {"slow": [st.floats(1e-6, 100.0)], "slack": [fraction], "weak": [fraction]}
+    if family_of(channel).name == "actuator" and kind == "stuck":
+        takes = {"stuck": data.draw(st.sampled_from([[], [fraction]]))}
+    small = st.just(0.0) | st.floats(1e-12, 100.0)
+    takes |= {"rate": [st.floats(0.1, 1e3)], "drift": [small, small]}
     values = tuple(data.draw(numbers) for numbers in takes.get(kind, []))
     from_s = data.draw(st.floats(-100.0, 100.0))
     fault = Fault(channel, kind, values, from_s, from_s + data.draw(st.floats(0.01, 1e3) | st.just(math.inf)))
@@ -224,6 +259,14 @@ def test_fault_of_what_there_is_not_is_refused(arguments, words):
             "this barometer has no full scale; set barometer.range_pa to a finite number of Pa",
         ),
         ({"faults": ["gyro:bias@3", "gyro:bias=5@3"]}, "named twice"),
+        (
+            {"faults": ["aileron:lost@3"], "aircraft": "gentle_lady"},
+            "gentle_lady has no aileron; it has elevator, rudder",
+        ),
+        ({"faults": ["motor:dead@3"], "aircraft": "gentle_lady"}, "gentle_lady has no motor; it has elevator, rudder"),
+        ({"faults": ["gps:rate=3@3"]}, "must divide the 4 Hz of the receiver: choose 4, 2, 1.33333, 1, 0.8 Hz or"),
+        ({"faults": ["gps:rate=4@3"], "rates.gps_hz": 10}, "must divide the 10 Hz of the receiver"),
+        ({"faults": ["gps:rate=2@3"], "suite": "devboard_red"}, "must divide the 1 Hz of the receiver"),
         ({"faults": 7}, "faults = 7: write channel:kind"),
         ({"fault": "gyro:bias@3"}, "did you mean faults"),
     ],
@@ -233,6 +276,12 @@ def test_override_of_faults_that_cannot_be_is_refused_in_one_line(changes, words
     with pytest.raises(ValueError, match=words) as refused:
         override(FlightConfig(), changes)
     assert "\n" not in str(refused.value)
+
+
+def test_fault_of_a_control_on_a_table_is_refused():
+    """Nothing moves there."""
+    with pytest.raises(ValueError, match="the flight is on a table, where no control moves"):
+        override(FlightConfig(start=BenchStart()), {"faults": ["motor:dead@3"]})
 
 
 def test_configuration_keeps_faults_as_texts_that_say_all():
@@ -314,8 +363,8 @@ def test_saturated_magnetometer_and_pitot_tube_read_their_full_scale():
     _, measured = spoiled(f"mag:saturated{WINDOW}", f"airspeed:saturated{WINDOW}", "airspeed:saturated=-1@2")
     np.testing.assert_allclose(measured["mag_b_ut"][104:149], 100.0, rtol=0, atol=1e-12)
     fastest = math.sqrt(2.0 * 500.0 / density_kg_m3(ELEVATION_M))
-    np.testing.assert_allclose(measured["airspeed_m_s"][104:149], fastest, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(measured["airspeed_m_s"][149:], 0.0)
+    np.testing.assert_allclose(measured["equivalent_airspeed_m_s"][104:149], fastest, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(measured["equivalent_airspeed_m_s"][149:], 0.0)
 
 
 def test_saturated_compass_that_tells_an_overflow_reads_its_code():

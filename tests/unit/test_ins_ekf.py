@@ -340,7 +340,7 @@ def test_uncalibrated_magnetometer_gives_the_first_heading_and_no_more():
 def test_airspeed_tells_the_wind_along_a_straight_flight():
     """Straight on, the wind ahead is unknown without a pitot tube and known with it."""
     rows, _ = coordinated(rate_rad_s=0.0, wind=(3.0, 1.0), heading_rad=0.0)
-    rows["airspeed_m_s"] = 13.0
+    rows["equivalent_airspeed_m_s"] = 13.0
     _, without = replayed(rows)
     rows["air_new"][::5] = 1
     _, fitted = replayed(rows)
@@ -399,7 +399,7 @@ def test_garbage_never_leaves_the_rotations(seed):
         rows[name] = scale * rng.standard_normal((n, 3))
         rows[name][rng.random(n) < 0.05] = rng.choice([np.nan, np.inf, -1e300])
     rows["gps_t_s"] = rows["t_s"] - rng.choice([0.3, 5.0, -1.0, np.nan], n)
-    rows["airspeed_m_s"] = rng.choice([13.0, np.nan, -5.0, 1e6, 900.0], n)
+    rows["equivalent_airspeed_m_s"] = rng.choice([13.0, np.nan, -5.0, 1e6, 900.0], n)
     for name in ("gps_new", "mag_new", "air_new"):
         rows[name] = rng.random(n) < 0.3
     estimates, estimator = replayed(rows, replace(GENERIC, magnetometer_calibrated=True))

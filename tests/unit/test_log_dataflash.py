@@ -38,7 +38,7 @@ MULTIPLIERS = {"-": 0.0, "?": 1.0, "0": 1.0, "A": 1e-1, "B": 1e-2, "C": 1e-3, "F
 # Floats of 24 bits: 1e-7 of 20 m/s^2, and of a course of 360 degrees; whole milligauss, centimetres, and 1e-7 degrees.
 RESOLUTION = {
     "gyro_b_rad_s": 1e-7, "force_b_m_s2": 2e-6, "mag_b_ut": 0.051, "gps_speed_m_s": 4e-6, "gps_course_rad": 5e-7,
-    "gps_v_e_m_s": 2e-5, "gps_p_e_m": 0.025, "airspeed_m_s": 4e-6, "baro_height_m": 1e-5,
+    "gps_v_e_m_s": 2e-5, "gps_p_e_m": 0.025, "equivalent_airspeed_m_s": 4e-6, "baro_height_m": 1e-5,
 }  # fmt: skip
 Message = tuple[int, str, tuple[Any, ...]]  # time, name, fields
 ONE_READ = "only one of several instances is read: IMU 0 (of 0, 1); GPS 0 (of 0, 1)"
@@ -169,7 +169,7 @@ def test_log_of_2013_is_read_as_it_was_written(logged, demand_same_rows, write):
             told.append((t, "ATT", (t / 1e3, v[1], v[2] - 1.0, *v[3:])))
     log = write(Writer(formats, told=False).log(told))
     expected = logged.expected(stamped=False)
-    for missing, nothing in (("air_new", 0), ("airspeed_m_s", 0.0), ("baro_height_m", np.nan)):
+    for missing, nothing in (("air_new", 0), ("equivalent_airspeed_m_s", 0.0), ("baro_height_m", np.nan)):
         expected[missing] = nothing
     # Speed in whole cm/s, course in hundredths of a degree of 30 m/s.
     coarse = {"gps_speed_m_s": 0.0051, "gps_course_rad": 1e-4, "gps_v_e_m_s": 0.008}

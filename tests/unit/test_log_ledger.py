@@ -113,7 +113,7 @@ def test_books_of_any_rows_agree(seed, tmp_path):
         rows[name] = rng.random(N) < 0.4
     rows["gyro_b_rad_s"][rng.random(N) < 0.1, 1] = np.nan
     rows["gps_v_e_m_s"][rng.random(N) < 0.1, 0] = np.nan
-    rows["airspeed_m_s"][rng.random(N) < 0.3] = np.nan
+    rows["equivalent_airspeed_m_s"][rng.random(N) < 0.3] = np.nan
     rows["baro_height_m"][rng.random(N) < 0.3] = np.nan
     rows["t_s"][[30, 31]] = rows["t_s"][[31, 30]]
     reference = Reference(np.where(rng.random((N, 1, 1)) < 0.2, np.nan, np.eye(3)), "truth", "t")

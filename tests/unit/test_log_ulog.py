@@ -35,7 +35,7 @@ TODAY = {
 # Floats of 24 bits, of rates below 2 rad/s, 20 m/s^2, 60 uT, 30 m/s and 600 m; a degree is 1e5 m, a double 1e-14 of it.
 RESOLUTION = {
     "gyro_b_rad_s": 1e-7, "force_b_m_s2": 2e-6, "mag_b_ut": 4e-6, "gps_speed_m_s": 3e-6, "gps_course_rad": 1e-6,
-    "gps_v_e_m_s": 2e-6, "gps_p_e_m": 1e-3, "airspeed_m_s": 4e-6, "baro_height_m": 7e-5,
+    "gps_v_e_m_s": 2e-6, "gps_p_e_m": 1e-3, "equivalent_airspeed_m_s": 4e-6, "baro_height_m": 7e-5,
 }  # fmt: skip
 Message = tuple[int, str, int, tuple[Any, ...]]  # time, topic, instance, fields
 FIX_BYTES = 3 + 2 + struct.calcsize("<QQdddfffffB?")  # of a message, with its header and the number of its topic
@@ -151,7 +151,7 @@ def test_log_of_2017_is_read_as_it_was_written(logged, demand_same_rows, write):
         told.append((t, "vehicle_gps_position", 0, (t, *whole, *v, 3, True)))
     told += [(t, "sensor_mag", 0, (t, *(b / 100.0))) for t, b in zip(logged.field_us, logged.field, strict=True)]
     expected = logged.expected(stamped=False)
-    for missing, nothing in (("air_new", 0), ("airspeed_m_s", 0.0), ("baro_height_m", np.nan)):
+    for missing, nothing in (("air_new", 0), ("equivalent_airspeed_m_s", 0.0), ("baro_height_m", np.nan)):
         expected[missing] = nothing
     log = write(ulog(told, topics))
     # The interval is a float of 0.02 s; 1e-7 degrees are 11 mm.
@@ -220,7 +220,7 @@ def test_airspeed_without_a_true_one_is_the_indicated(logged, write):
         (t, name, i, (*v[:2], np.nan) if name == "airspeed" else v) for t, name, i, v in messages(logged, "vehicle_imu")
     ]
     log = write(ulog(told))
-    assert log.rows["airspeed_m_s"][-1] == pytest.approx(0.97 * logged.airspeed[-1], rel=1e-6)
+    assert log.rows["equivalent_airspeed_m_s"][-1] == pytest.approx(0.97 * logged.airspeed[-1], rel=1e-6)
     assert log.repairs == ()
 
 

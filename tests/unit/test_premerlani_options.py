@@ -142,7 +142,7 @@ def test_airspeed_takes_the_place_of_ground_speed_in_a_turn_in_wind():
     """Where the receiver reports 5 m/s too much, a pitot tube keeps the turn level; ignored, it does not."""
     rows, R = circling(40.0, (0.0, 0.0))
     rows["gps_speed_m_s"] += 5.0
-    rows["air_new"][::5], rows["airspeed_m_s"] = 1, SPEED
+    rows["air_new"][::5], rows["equivalent_airspeed_m_s"] = 1, SPEED
     on, off = (tilt_deg(power_up(R[0], use_airspeed=use, k_i=0.0).replay(rows), R)[-1] for use in (True, False))
     assert on < 0.1
     assert off > 5.0
@@ -153,7 +153,7 @@ def test_airspeed_that_is_none_changes_nothing(reading):
     """A barometer alone, a blocked tube: the GPS goes on giving the speed."""
     rows, R = circling(10.0, (0.0, 0.0))
     without = power_up(R[0]).replay(rows)
-    rows["air_new"], rows["airspeed_m_s"] = 1, reading
+    rows["air_new"], rows["equivalent_airspeed_m_s"] = 1, reading
     assert power_up(R[0]).replay(rows).tobytes() == without.tobytes()
 
 
@@ -161,7 +161,7 @@ def test_airspeed_of_no_size_is_refused_and_changes_no_attitude():
     """An infinite airspeed is counted for every sample, the health is poor, and the GPS goes on giving the speed."""
     rows, R = circling(10.0, (0.0, 0.0))
     without = power_up(R[0]).replay(rows)
-    rows["air_new"], rows["airspeed_m_s"] = 1, math.inf
+    rows["air_new"], rows["equivalent_airspeed_m_s"] = 1, math.inf
     estimator = power_up(R[0])
     got = estimator.replay(rows)
     np.testing.assert_array_equal(got["R_eb"], without["R_eb"])

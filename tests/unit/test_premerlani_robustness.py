@@ -25,7 +25,7 @@ ROW = st.fixed_dictionaries(
         "gps_course_rad": NUMBER,
         "gps_speed_m_s": NUMBER,
         "air_new": st.integers(0, 1),
-        "airspeed_m_s": NUMBER,
+        "equivalent_airspeed_m_s": NUMBER,
     }
 )
 
@@ -53,7 +53,7 @@ def flight(n, seed=0, gps=True):
     if gps:
         rows["gps_new"][::10] = 1
         rows["gps_course_rad"], rows["gps_speed_m_s"] = rng.uniform(0.0, 6.28, n), rng.uniform(2.0, 15.0, n)
-        rows["air_new"][::25], rows["airspeed_m_s"] = 1, rng.uniform(8.0, 15.0, n)
+        rows["air_new"][::25], rows["equivalent_airspeed_m_s"] = 1, rng.uniform(8.0, 15.0, n)
     return rows
 
 

@@ -161,6 +161,18 @@ def test_parquet_with_another_column_is_refused_by_its_name(tmp_path, flight):
         load(tmp_path / "less.parquet")
 
 
+def test_recording_from_before_the_rename_of_the_airspeed_loads_bit_for_bit(tmp_path, flight):
+    """`measured.equivalent_airspeed_m_s` was `measured.airspeed_m_s`."""
+    save(flight, tmp_path)
+    (tmp_path / MANIFEST).unlink()
+    table = pq.read_table(tmp_path / PARQUET)
+    older = [name.replace("measured.equivalent_airspeed", "measured.airspeed") for name in table.column_names]
+    assert "measured.airspeed_m_s" in older
+    table = table.rename_columns(older).replace_schema_metadata(table.schema.metadata)
+    pq.write_table(table, tmp_path / PARQUET)
+    assert digest(load(tmp_path)) == digest(flight)
+
+
 def test_parquet_changed_after_the_fact_is_refused(tmp_path, flight):
     """A good Parquet file that is not the one which the manifest describes."""
     save(flight, tmp_path / "a")

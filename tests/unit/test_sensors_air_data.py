@@ -34,7 +34,7 @@ def sensed(airspeed=None, barometer=None, speed_m_s=0.0, height_m=0.0, n=50, rat
 def speeds(params, speed_m_s, **kw):
     """The airspeeds that arrived."""
     rows = sensed(params, None, speed_m_s, **kw)
-    return rows["airspeed_m_s"][rows["air_new"] == 1]
+    return rows["equivalent_airspeed_m_s"][rows["air_new"] == 1]
 
 
 def heights(params, height_m, **kw):
@@ -62,7 +62,7 @@ def test_perfect_air_data_are_the_truth():
     rows = sensed(AirspeedParams(), BarometerParams(), speed, height, n=200)
     new = np.flatnonzero(rows["air_new"])
     np.testing.assert_array_equal(new, np.arange(4, 200, 5))
-    np.testing.assert_allclose(rows["airspeed_m_s"][new], speed[new], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(rows["equivalent_airspeed_m_s"][new], speed[new], rtol=0, atol=1e-13)
     np.testing.assert_array_equal(rows["baro_height_m"][new], height[new])
 
 
@@ -86,7 +86,7 @@ def test_samples_are_in_the_first_tick_that_ends_at_their_time_or_later(physics_
     stamps = np.array(list(due.values()))
     # Before the end of the first tick there is nothing to interpolate from.
     later = stamps >= 1.0 / imu_hz
-    np.testing.assert_allclose(rows["airspeed_m_s"][new][later], 2.0 + stamps[later], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rows["equivalent_airspeed_m_s"][new][later], 2.0 + stamps[later], rtol=0, atol=1e-12)
     np.testing.assert_allclose(rows["baro_height_m"][new][later], 3.0 * stamps[later], rtol=0, atol=1e-12)
 
 
@@ -97,7 +97,7 @@ def test_two_rates_hold_each_its_last_sample():
     speed_ticks = {5 * j - 1 for j in range(1, 21)}
     height_ticks = {math.ceil(12.5 * j) - 1 for j in range(1, 9)}
     assert set(np.flatnonzero(rows["air_new"])) == speed_ticks | height_ticks
-    for column, ticks in (("airspeed_m_s", speed_ticks), ("baro_height_m", height_ticks)):
+    for column, ticks in (("equivalent_airspeed_m_s", speed_ticks), ("baro_height_m", height_ticks)):
         first = min(ticks)
         assert np.all(np.isnan(rows[column][:first]))
         assert set(np.flatnonzero(np.diff(rows[column][first:])) + first + 1) == ticks - {first}
@@ -107,7 +107,7 @@ def test_two_rates_hold_each_its_last_sample():
 def test_part_that_is_not_fitted_reads_nan(airspeed, barometer):
     """In every row, new or not; the other reads."""
     rows = sensed(airspeed, barometer, 12.0, 30.0)
-    missing, there = ("baro_height_m", "airspeed_m_s")[:: 1 if barometer is None else -1]
+    missing, there = ("baro_height_m", "equivalent_airspeed_m_s")[:: 1 if barometer is None else -1]
     assert rows["air_new"].sum() == 10
     assert np.all(np.isnan(rows[missing]))
     assert np.all(np.isfinite(rows[there][rows["air_new"] == 1]))

@@ -27,7 +27,7 @@
 
 /* Later versions append fields to the structs and raise this number.  A program that knows version N loads libraries of
  * versions 1 to N. */
-#define WINGSLEVEL_ABI_VERSION 1
+#define WINGSLEVEL_ABI_VERSION 2
 
 #if defined(_WIN32)
 #define WINGSLEVEL_EXPORT __declspec(dllexport)
@@ -105,7 +105,7 @@ typedef struct wingslevel_measurements {
     int64_t mag_new;        /* 1: a magnetometer sample arrived in this tick */
     double mag_b_ut[3];     /* magnetic field, microtesla */
     int64_t air_new;        /* 1: airspeed or barometric height arrived in this tick */
-    double airspeed_m_s;    /* NaN without a pitot tube */
+    double equivalent_airspeed_m_s; /* sqrt(2 q / 1.225 kg/m3) of the pitot pressure q; NaN without a pitot tube */
     double baro_height_m;   /* above the launch point; NaN without a barometer */
 } wingslevel_measurements;
 

@@ -46,8 +46,9 @@ def columns(flight: Flight) -> list[Column]:
         new = rows["air_new"] > 0
         found.append(Column("air_new", "air.new", rows["air_new"].astype(np.float64)))
         for name, meaning, column in (
-            ("airspeed_m_s", "airspeed m/s", "airspeed_m_s"), ("baro_height_m", "height m", "baro_height_m"),
-        ):  # fmt: skip
+            ("equivalent_airspeed_m_s", "airspeed m/s", "equivalent_airspeed_m_s"),
+            ("baro_height_m", "height m", "baro_height_m"),
+        ):
             if np.isfinite(rows[column][new]).any():
                 found.append(Column(name, meaning, _where(new, rows[column])))
     R_eb = flight.log.truth["R_eb"]

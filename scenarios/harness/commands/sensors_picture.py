@@ -221,7 +221,7 @@ def _air(ax: Any, kind: str, log: Log) -> None:
     truth, read = log.truth[shown], log.measured[shown]
     new = read["air_new"] == 1
     if kind == "airspeed":
-        true, told, word, title = truth["airspeed_m_s"], read["airspeed_m_s"], "airspeed, m/s", "Pitot tube"
+        true, told, word, title = truth["airspeed_m_s"], read["equivalent_airspeed_m_s"], "airspeed, m/s", "Pitot tube"
     else:
         true, told, word, title = -truth["p_e_m"][:, 2], read["baro_height_m"], "height, m", "Barometer"
     ax.plot(truth["t_s"], true, color=INK, lw=1.1, label="truth")

@@ -2,11 +2,7 @@
 
 from scenarios.harness.config.air import AirConfig, GustConfig, Wind, build_air, parse_wind
 from scenarios.harness.config.flight import (
-    BenchStart,
     FlightConfig,
-    HandMotion,
-    HandThrowStart,
-    InFlightStart,
     RatesConfig,
     fitted_suite,
     is_field,
@@ -15,6 +11,7 @@ from scenarios.harness.config.flight import (
     override,
     resolve,
 )
+from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStart, InFlightStart
 
 __all__ = [
     "AirConfig",

@@ -6,17 +6,22 @@ from collections.abc import Sequence
 from typing import Any
 
 from scenarios.harness.plugins import near_misses
+from sim.aeroplane.actuators import require_control
+from sim.faults import CHANNELS, Fault, kinds_of
 from sim.outside.numbers import number
-from sim.sensors.faults import CHANNELS, Fault, kinds_of, require_possible
+from sim.sensors.faults import require_possible
 
 _NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)"
 _FAULT = re.compile(rf"([^:=@]+):([^:=@]+)(?:=([^:=@]*))?@({_NUMBER})s?(-(?:({_NUMBER})s?)?)?")
-_RIGHT = "write channel:kind@from-to or channel:kind=value@from, for instance gyro.x:stuck@20-25 or gps:jump=50@10"
-_SHORT = {"accel": "accelerometer", "mag": "magnetometer", "baro": "barometer"}
+_RIGHT = (
+    "write channel:kind@from-to or channel:kind=value@from, for instance gyro.x:stuck@20-25, gps:jump=50@10 "
+    "or motor:dead@30"
+)
+_SHORT = {"accel": "accelerometer", "mag": "magnetometer", "baro": "barometer", "throttle": "motor"}
 
 
 def parse_fault(text: str) -> Fault:
-    """Parse a fault: ``gyro.x:stuck@20-25``, ``gps:jump=50,-20@10``, see `sim.sensors.faults`.
+    """Parse a fault: ``gyro.x:stuck@20-25``, ``gps:jump=50,-20@10``, ``motor:dead@30``, see `sim.faults`.
 
     Seconds count from the release, so that -3 is in the hand; without an end it lasts to the end of the flight.
 
@@ -70,7 +75,17 @@ def _is_met(fault: Fault, held_s: float, duration_s: float) -> bool:
     return fault.from_s < duration_s and fault.to_s > -held_s
 
 
-def require_faults_possible(faults: Sequence[str], suite: Any) -> None:
-    """ValueError for a fault of a sensor that `suite` does not have."""
-    for fault in faults:
-        require_possible(parse_fault(fault), suite)
+def require_faults_possible(
+    faults: Sequence[str], suite: Any, gps_hz: float | None, aircraft: str, flies: bool
+) -> None:
+    """ValueError for a fault that the sensors of `suite` or the controls of `aircraft` cannot have.
+
+    gps_hz : None for the receiver's own rate       flies : whether it is not on a table
+    """
+    for fault in map(parse_fault, faults):
+        if fault.family == "sensor":
+            require_possible(fault, suite, gps_hz)
+        elif fault.family == "actuator" and not flies:
+            raise ValueError(f"fault {fault}: the flight is on a table, where no control moves; choose one that flies")
+        elif fault.family == "actuator":
+            require_control(str(fault), fault.channel, aircraft)

@@ -6,9 +6,8 @@ The resolved configuration goes into the manifest, from which the flight can be 
 
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from estimator.instruments import PROPERTIES, property_names, property_value
@@ -16,6 +15,7 @@ from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
+from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
 from scenarios.harness.config.validation import validated
 from scenarios.harness.plugins import Maker
 from scenarios.harness.seeds import LARGEST_SEED
@@ -26,15 +26,12 @@ from sim.outside.numbers import RIGHT, is_odd, number
 from sim.outside.wording import printable
 from sim.params import changed as change_params
 from sim.params import dotted_fields, require_fitted, shown, unit_of
-from sim.rng import stream
 from sim.sensors.fitting import SuiteParams, own_files, suite_params
 
 MOST_BYTES = 2_000_000_000  # of a flight's log, which is held in memory
 ROW_BYTES = sum(dtype.itemsize for dtype in (TRUTH_DTYPE, MEASURED_DTYPE, FLOWN_DTYPE))
 SMALLEST, LARGEST = 1e-12, 1e9  # size of a non-zero number, in any unit
 
-Chance = Literal["random"]
-Triple = tuple[float, float, float]
 Figure = float | bool | str | tuple[float, ...]  # type of a sensor field; the dataclass says which
 
 
@@ -67,73 +64,6 @@ class RatesConfig(_Model):
         return Rates(self.physics_hz, self.imu_hz, self.gps_hz)
 
 
-class InFlightStart(_Model):
-    """Start in trimmed level flight, `out_m` from the launch point in the direction of the heading."""
-
-    kind: Literal["in_flight"] = "in_flight"
-    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
-    height_m: float = Field(default=60.0, gt=0.0, le=3000.0)
-    out_m: float = Field(default=0.0, ge=0.0, le=5000.0)
-    airspeed_m_s: float | None = Field(default=None, gt=0.0)
-
-
-class HandMotion(_Model):
-    """Motion of the hand: rates a_i sin(2 pi f_i t + phase_i) about each axis, and the twist at the release."""
-
-    sway_deg_s: Triple
-    sway_hz: Triple
-    sway_phase_deg: Triple
-    release_rate_deg_s: Triple
-
-
-class HandThrowStart(_Model):
-    """Start in the hand at the launch point, then a throw.
-
-    height_m : of the hand above the ground; above arm's length it is a throw off a slope
-    sway_deg_s : largest rate of the hand about each axis     release_rate_deg_s : sigma of the twist, each axis
-    hand : "random" draws the motion from these two; a resolved configuration holds what was drawn
-    calibration_s : from power-up, over which the gyro offset is measured in the hand
-    """
-
-    kind: Literal["hand_throw"] = "hand_throw"
-    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
-    pitch_deg: float = Field(default=15.0, ge=-30.0, le=60.0)
-    height_m: float = Field(default=1.7, gt=0.0, le=300.0)
-    hold_s: float = Field(default=8.0, gt=0.0, le=600.0)
-    push_m_s2: float = Field(default=27.0, gt=0.0, le=100.0)
-    push_s: float = Field(default=0.3, gt=0.0, le=2.0)
-    sway_deg_s: float = Field(default=3.0, ge=0.0, le=60.0)
-    release_rate_deg_s: float = Field(default=15.0, ge=0.0, le=90.0)
-    calibration_s: float = Field(default=2.0, ge=0.0)
-    hand: HandMotion | Chance = "random"
-
-    @model_validator(mode="after")
-    def _calibrate_in_the_hand(self) -> "HandThrowStart":
-        if self.calibration_s > self.hold_s:
-            raise ValueError(
-                f"calibration_s = {self.calibration_s:g} s: at most hold_s, the {self.hold_s:g} s in the hand"
-            )
-        return self
-
-
-class BenchStart(_Model):
-    """At rest on a table indoors for the whole flight: still air, no motor, no controls.
-
-    height_m : of the table     calibration_s : from power-up, over which the gyro offset is measured; judging
-    starts after it
-    """
-
-    kind: Literal["bench"] = "bench"
-    heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
-    roll_deg: float = Field(default=0.0, ge=-180.0, le=180.0)
-    pitch_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
-    height_m: float = Field(default=0.8, ge=0.0, le=10.0)
-    calibration_s: float = Field(default=2.0, ge=0.0, le=600.0)
-
-
-AnyStart = InFlightStart | HandThrowStart | BenchStart
-
-
 class FlightConfig(_Model):
     """Everything that decides a flight, apart from the code.
 
@@ -148,7 +78,7 @@ class FlightConfig(_Model):
     ``calibration`` is given the result, see `aboard`
     files : path -> text of the user's own sensor files; a resolved configuration holds them
     manoeuvre : the scenario's own parameters
-    faults : of the sensors, each as text, ``gyro.x:stuck@20-25``, see `fault_config.parse_fault`
+    faults : of sensors, surfaces and motor, each as text, ``gyro.x:stuck@20-25``, see `config.faults.parse_fault`
     box_radius_m, box_height_m : of the cylinder around the launch point; the flight ends when it is left
     seed, flight : campaign, and number of the flight in it: they name the random streams
     """
@@ -268,7 +198,8 @@ def overridden(
             _put(data, full_name, value)
     changed = validated(FlightConfig, data)
     fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
-    require_faults_possible(changed.faults, fitted)
+    flies = not isinstance(changed.start, BenchStart)
+    require_faults_possible(changed.faults, fitted, changed.rates.gps_hz, changed.aircraft, flies)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed, fitted
@@ -369,7 +300,7 @@ def resolve(config: FlightConfig, suite: SuiteParams | None = None) -> FlightCon
 
     suite : what is carried, as `fitted_suite` gives it; None looks it up
     """
-    start = _resolve_start(config)
+    start = resolve_start(config.start, config.seed, config.flight)
     air = resolve_air(config.air, start.heading_deg, config.seed, config.flight)
     files = config.files or own_files(config.suite)
     return config.model_copy(
@@ -384,29 +315,3 @@ def _resolve_rates(config: FlightConfig, suite: SuiteParams | None) -> RatesConf
     rates = config.rates.model_copy(update={"gps_hz": receiver_hz})
     rates.build()  # refuses a receiver whose rate the physics cannot keep
     return rates
-
-
-def _resolve_start(config: FlightConfig) -> Any:
-    start: AnyStart = config.start
-    if start.heading_deg == "random":
-        heading_deg = 360.0 * float(stream(config.seed, config.flight, "start_heading").random())
-        start = start.model_copy(update={"heading_deg": heading_deg})
-    if isinstance(start, HandThrowStart) and start.hand == "random":
-        start = start.model_copy(update={"hand": _draw_hand(config, start)})
-    return start
-
-
-def _draw_hand(config: FlightConfig, start: HandThrowStart) -> HandMotion:
-    """The hand sways at 0.4 to 1.2 Hz, as an arm does; the twist is normal, truncated at two sigma."""
-    rng = stream(config.seed, config.flight, "hand")
-    sway = start.sway_deg_s * rng.uniform(0.5, 1.0, 3)
-    hz, phase = rng.uniform(0.4, 1.2, 3), rng.uniform(0.0, 360.0, 3)
-    twist = start.release_rate_deg_s * np.clip(rng.standard_normal(3), -2.0, 2.0)
-    return HandMotion(
-        sway_deg_s=_triple(sway), sway_hz=_triple(hz), sway_phase_deg=_triple(phase), release_rate_deg_s=_triple(twist)
-    )
-
-
-def _triple(values: np.ndarray) -> Triple:
-    x, y, z = (float(v) for v in values)
-    return x, y, z

@@ -3,7 +3,8 @@
 import math
 
 from scenarios.harness.config.air import build_air
-from scenarios.harness.config.flight import BenchStart, FlightConfig, HandMotion, HandThrowStart
+from scenarios.harness.config.flight import FlightConfig
+from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStart
 from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.clock import Rates
 from sim.motion.prescribed_plant import PrescribedPlant, Rest

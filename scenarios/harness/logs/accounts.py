@@ -96,7 +96,7 @@ def _arrived(rows: NDArray[Any]) -> dict[str, NDArray[np.bool_]]:
     return {
         "gps": np.asarray(rows["gps_new"] > 0),
         "magnetometer": np.asarray(rows["mag_new"] > 0),
-        "airspeed": np.asarray(air & (np.isfinite(rows["airspeed_m_s"]) | ~height)),
+        "airspeed": np.asarray(air & (np.isfinite(rows["equivalent_airspeed_m_s"]) | ~height)),
         "barometer": np.asarray(air & height),
     }
 

@@ -37,7 +37,7 @@ _DEGREES = 180.0 / np.pi
 _ARRIVALS = (
     ("gps_new", "GPS fixes", ("gps_v_e_m_s", "gps_course_rad", "gps_speed_m_s"), "gps"),
     ("mag_new", "magnetic samples", ("mag_b_ut",), "magnetometer"),
-    ("air_new", "air-data samples", ("airspeed_m_s", "baro_height_m"), "airspeed"),
+    ("air_new", "air-data samples", ("equivalent_airspeed_m_s", "baro_height_m"), "airspeed"),
 )
 _EITHER = "air_new"  # one of its numbers is enough: not every aeroplane has a pitot tube
 

@@ -32,7 +32,7 @@ def measured(rows: NDArray[Any]) -> dict[str, Known]:
 
 def sensors(rows: NDArray[Any]) -> tuple[str, ...]:
     """The sensors of which `rows` hold a sample."""
-    air = (rows["air_new"] > 0) & np.isfinite(rows["airspeed_m_s"])
+    air = (rows["air_new"] > 0) & np.isfinite(rows["equivalent_airspeed_m_s"])
     has = {"gps": rows["gps_new"], "magnetometer": rows["mag_new"], "airspeed": air}
     return ("gyro", "accelerometer", *(name for name, new in has.items() if np.any(new)))
 

@@ -82,7 +82,7 @@ def read(path: Path, reference: Path | None = None) -> RecordedLog:
     rows["gps_course_rad"] = np.arctan2(velocity[:, 1], velocity[:, 0]) % (2.0 * np.pi)
     rows["mag_new"] = table["mag_new"] > 0.0
     rows["mag_b_ut"] = _held(COUNT_UT * _vector(table, "mx", "my", "mz"), rows["mag_new"] > 0)
-    rows["air_new"], rows["airspeed_m_s"] = bool(np.any(table["airspeed"] != 0.0)), table["airspeed"]
+    rows["air_new"], rows["equivalent_airspeed_m_s"] = bool(np.any(table["airspeed"] != 0.0)), table["airspeed"]
     rows["baro_height_m"] = np.nan
     attitudes = _reference(path, reference, table["t"])
     if attitudes is not None and "_ap2013_" in attitudes.name:

@@ -123,7 +123,7 @@ def recorded(path: Path, messages: Messages, repairs: list[str]) -> RecordedLog:
     if (field := ticks.put("magnetometer", messages.magnetic, "mag_new")) is not None:
         rows["mag_b_ut"] = np.nan_to_num(field)
     if (airspeed := ticks.put("airspeed", messages.airspeed, "air_new")) is not None:
-        rows["airspeed_m_s"] = np.nan_to_num(airspeed[:, 0])
+        rows["equivalent_airspeed_m_s"] = np.nan_to_num(airspeed[:, 0])
     height = ticks.put("barometer", messages.height, None)
     rows["baro_height_m"] = np.nan if height is None else height[:, 0]
     reference = _reference(path, messages, rows["t_s"], after_gap, account)

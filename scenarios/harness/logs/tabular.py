@@ -276,7 +276,7 @@ def _take_air(made: _Making, group: Group) -> None:
     """Fill airspeed and height; without ``air.new`` and ``height.new`` each number is a sample."""
     rows, table = made.rows, group.table
     for stream, quantity, column, flags in (
-        ("airspeed", "airspeed", "airspeed_m_s", ("air.new",)),
+        ("airspeed", "airspeed", "equivalent_airspeed_m_s", ("air.new",)),
         ("barometer", "height", "baro_height_m", ("height.new", "air.new")),
     ):
         if quantity not in table:
@@ -293,7 +293,7 @@ def _take_air(made: _Making, group: Group) -> None:
             if quantity == "airspeed" or "air.new" in table:
                 rows["air_new"] |= new
     if "height" in table and "airspeed" not in made.ledger and rows["air_new"].any():
-        rows["airspeed_m_s"] = np.nan  # air data without a pitot tube
+        rows["equivalent_airspeed_m_s"] = np.nan  # air data without a pitot tube
 
 
 def _take_attitude(
