@@ -102,6 +102,7 @@ class EnergyParams:
 
 SLOWEST, FASTEST = 0.6, 1.6  # range of a plausible airspeed over cruise
 STALL_MARGIN = 1.2
+SEEN_S = 300.0  # time constant with which the largest tailwind is forgotten
 
 
 @kernel
@@ -136,14 +137,29 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
 
 
 @kernel
-def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
+def see_wind(north, east, s, dt_s):  # type: ignore[no-untyped-def]
+    """Update the wind that the ground speed alone shows: the largest tailwind of the last minutes, along its course.
+
+    north, east : direction of the course   s : record with `ground_m_s`, `airspeed_m_s`; updates `wind_seen_e_m_s`
+    """
+    tailwind_m_s, w = s.ground_m_s - s.airspeed_m_s, s.wind_seen_e_m_s
+    w[0] -= dt_s / SEEN_S * w[0]
+    w[1] -= dt_s / SEEN_S * w[1]
+    if tailwind_m_s > math.hypot(w[0], w[1]):
+        w[0], w[1] = tailwind_m_s * north, tailwind_m_s * east
+
+
+@kernel
+def believe_headwind(towards_north, towards_east, circles, wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Update ground speed and headwind along the desired direction, at least 0, m/s, in `s`.
 
     The headwind comes from the estimated wind; if unknown, from the difference of airspeed and ground speed along the
     track, which shows it even before a turn into the wind.  It rises quickly and falls slowly, because it is not
-    visible across the wind.
+    visible across the wind.  On a circle or a route the whole wind counts, whatever the present track: who flies
+    slowly with it is carried away before he has turned.
 
-    towards_north, towards_east : unit vector, or (0, 0) for the present track   wind_e_m_s : shape (3,) or NaN
+    towards_north, towards_east : unit vector, or (0, 0) for the present track   circles : on a circle or a route
+    wind_e_m_s : shape (3,) or NaN
     row : measured   p : record of AutopilotParams   s : record with `ground_m_s` (NaN: unknown) and `headwind_m_s`
     """
     now_m_s, lag_s = 0.0, gps_age(row, p.guidance)
@@ -155,7 +171,12 @@ def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s): 
         if towards_north == 0.0 and towards_east == 0.0:
             towards_north, towards_east = north, east
         now_m_s = (s.airspeed_m_s - s.ground_m_s) * (towards_north * north + towards_east * east)
-        if is_wind(wind_e_m_s, 2):
+        see_wind(north, east, s, dt_s)
+        if is_wind(wind_e_m_s, 2) and circles:
+            now_m_s = math.hypot(wind_e_m_s[0], wind_e_m_s[1])
+        elif circles:
+            now_m_s = max(abs(now_m_s), math.hypot(s.wind_seen_e_m_s[0], s.wind_seen_e_m_s[1]))
+        elif is_wind(wind_e_m_s, 2):
             now_m_s = -(towards_north * wind_e_m_s[0] + towards_east * wind_e_m_s[1])
     now_m_s = max(now_m_s, 0.0)
     filter_s = p.energy.headwind_found_s if now_m_s > s.headwind_m_s else p.energy.headwind_lost_s

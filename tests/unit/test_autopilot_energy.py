@@ -139,7 +139,7 @@ def test_headwind_is_seen_from_the_wind_or_from_the_ground_speed(towards, ground
     """Flying north over the ground with 12.6 m/s of airspeed."""
     s = state()
     for _ in range(500):
-        believe_headwind(*towards, wind, row_of(v_e_m_s=(ground_m_s, 0.0, 0.0)), s, record(), DT_S)
+        believe_headwind(*towards, 0, wind, row_of(v_e_m_s=(ground_m_s, 0.0, 0.0)), s, record(), DT_S)
     np.testing.assert_allclose(s["headwind_m_s"], expected, rtol=0, atol=0.01)
 
 
