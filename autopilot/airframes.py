@@ -13,6 +13,7 @@ from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
 from autopilot.guidance import GuidanceParams
 from autopilot.launch import LaunchParams
+from autopilot.lift import LiftParams
 from autopilot.mixer import MixerParams
 from autopilot.route import RouteParams
 from autopilot.stabilise import StabiliseParams
@@ -26,6 +27,7 @@ class AutopilotParams:
     energy: EnergyParams = field(default_factory=EnergyParams)
     guidance: GuidanceParams = field(default_factory=GuidanceParams)
     launch: LaunchParams = field(default_factory=LaunchParams)
+    lift: LiftParams = field(default_factory=LiftParams)
     mixer: MixerParams = field(default_factory=MixerParams)
     route: RouteParams = field(default_factory=RouteParams)
     failsafe: FailsafeParams = field(default_factory=FailsafeParams)
@@ -83,6 +85,7 @@ _GENTLE_LADY = AutopilotParams(
         throttle_least=0.0,
     ),
     launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),
+    lift=LiftParams(incidence_per_elevator_rad=0.0),  # its glide pitch alone protects the speed
     mixer=MixerParams(elevator_trim=-0.12, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
     failsafe=FailsafeParams(
         glide_pitch_rad=_GLIDE_PITCH_RAD,

@@ -12,6 +12,7 @@ from autopilot.energy import (
     believe_airspeed,
     believe_headwind,
     hold_height,
+    steepest_bank,
     throttle_for,
     throttle_to_recover,
     want_airspeed,
@@ -46,6 +47,7 @@ from autopilot.interface import (
     Setpoint,
 )
 from autopilot.launch import climb_away, feel_throw
+from autopilot.lift import feel_lift
 from autopilot.mixer import mix
 from autopilot.route import bank_along_route, bank_to_circle
 from autopilot.stabilise import rate_control, rate_demand
@@ -79,6 +81,12 @@ _STATE = np.dtype(
         ("inverted", "i8"),  # flying inverted
         ("airspeed_m_s", "f8"),  # best knowledge
         ("airspeed_known", "i8"),  # measured, or from GPS and wind
+        ("lift_m_s", "f8"),  # airspeed from the elevator, 0 if unknown
+        ("elevator", "f8"),  # last command
+        ("refused", "i8"),  # contradicted by throttle and elevator
+        ("doubt_s", "f8"),  # how long it has been contradicted, decreasing while it is not
+        ("by_throttle_m_s", "f8"),  # airspeed that goes with throttle and climb, 0 before the first
+        ("throttle", "f8"),  # last command
         ("air_left_s", "f8"),  # remaining time for which the last measured airspeed is used
         ("airspeed_wanted_m_s", "f8"),
         ("ground_m_s", "f8"),  # speed over the ground, NaN if unknown
@@ -161,6 +169,7 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
         limit_rad = max(limit_rad, failsafe.bank_rad)
     if s.mode == LOW:
         limit_rad = min(limit_rad, failsafe.low_bank_rad)
+    limit_rad = min(limit_rad, max(steepest_bank(s, me.p.energy), failsafe.low_bank_rad))
     if not me.on_nose:
         limit_rad *= agility(s, me.p.energy.airspeed_m_s, p)
     r_zy = -R_eb[2, 1] if s.inverted else R_eb[2, 1]
@@ -237,10 +246,13 @@ def steer_on(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type:
     s, p = me.s, me.p
     s.unseen_turn_rad = unseen_turn(s.unseen_turn_rad, R_eb, omega_b_rad_s, gps_age(row, p.guidance), dt_s)
     reckon_speed(wind_e_m_s, row, me, dt_s)
+    feel_lift(row, s, p, dt_s)
     if s.mode == MANUAL:
+        s.doubt_s = s.refused = 0  # its throttle is not remembered
         return by_hand(me.setpoint)
     moved = control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
     aileron, elevator, rudder, throttle, bank, pitch = moved
+    s.elevator, s.throttle = elevator, throttle
     return aileron, elevator, rudder, throttle, s.mode, bank, pitch
 
 

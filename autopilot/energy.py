@@ -24,7 +24,9 @@ AIAA 83-2239.
 import math
 from dataclasses import dataclass
 
+from autopilot.doubt import doubt_airspeed
 from autopilot.guidance import gps_age, height, is_wind, unit
+from autopilot.interface import LOW
 from autopilot.stabilise import far_off
 from estimator.blocks.kernels import clip
 from estimator.blocks.screening import AIRSPEED_RANGE_M_S
@@ -66,6 +68,10 @@ class EnergyParams:
     throttle_per_height_1_m : integral gain of the energy error (1/m, default 0.01).  Higher: learns trim faster
     throttle_integral_limit : limit of that integral (default 0.2).  Lower: large trim errors remain
     throttle_least : minimum throttle (default 0.1), for airflow over the tail.  Higher: descends more slowly
+    doubt_m_s : difference of an airspeed from those that throttle and elevator tell, beyond which it is refused (m/s,
+        default 2.5).  Higher: larger errors are believed; lower: refused in gusts
+    doubt_s : time for which it has to differ, and to agree again (s, default 4).  Higher: refused later
+    doubt_filter_s : time constant of the airspeed from the throttle (s, default 2).  Higher: smoother but later
     """
 
     airspeed_m_s: float = 12.6
@@ -98,11 +104,15 @@ class EnergyParams:
     throttle_per_height_1_m: float = 0.01
     throttle_integral_limit: float = 0.2
     throttle_least: float = 0.1
+    doubt_m_s: float = 2.5
+    doubt_s: float = 4.0
+    doubt_filter_s: float = 2.0
 
 
 SLOWEST, FASTEST = 0.6, 1.6  # range of a plausible airspeed over cruise
 STALL_MARGIN = 1.2
 SEEN_S = 300.0  # time constant with which the largest tailwind is forgotten
+TURN_MARGIN = 1.1
 
 
 @kernel
@@ -111,7 +121,8 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
 
     Measured, if a pitot tube is fitted; else from GPS velocity minus estimated wind, corrected for the receiver's
     filter (time constant T), which shortens a vector turning at w by sqrt(1 + (w T)^2); else the trim speed.  Ground
-    speed alone is no measure of airspeed: it is wrong by the wind, and changes by twice that between opposite legs.
+    speed alone is no measure of airspeed: it is wrong by the wind, and changes by twice that between opposite legs.  An
+    airspeed that throttle and elevator contradict counts as unknown (`autopilot.doubt`).
 
     wind_e_m_s : shape (3,) or NaN   row : measured   p : record of AutopilotParams
     s : record with `airspeed_m_s`, `airspeed_known`, `air_left_s`, updated
@@ -129,6 +140,10 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
             filtered_m_s = math.sqrt((v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2)
             turned = s.unseen_turn_rad * p.guidance.gps_filter_s / max(lag_s, 1e-3)
             now_m_s, s.airspeed_known = filtered_m_s * math.hypot(1.0, turned), 1
+    if s.airspeed_known:
+        doubt_airspeed(now_m_s, -row.gps_v_e_m_s[2] if math.isfinite(gps_age(row, p.guidance)) else 0.0, s, e, dt_s)
+    if s.refused:
+        s.airspeed_known = 0
     if not s.airspeed_known:
         now_m_s = s.airspeed_wanted_m_s
     now_m_s = clip(now_m_s, SLOWEST * e.airspeed_m_s, FASTEST * e.airspeed_m_s)
@@ -231,6 +246,38 @@ def least_airspeed(s, e):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
+    """The airspeed of the guards against a stall, m/s; infinite if unknown.
+
+    Measured, or from the elevator (`autopilot.lift`), or from the estimated wind, which is late and may be wrong.
+    """
+    if s.lift_m_s > 0.0 and not (s.airspeed_known and s.air_left_s > 0.0):
+        return s.lift_m_s
+    return s.airspeed_m_s if s.airspeed_known else math.inf
+
+
+@kernel
+def most_climb(s, e):  # type: ignore[no-untyped-def]
+    """Largest climb demand, m/s, that leaves the speed above the stall; infinite if the airspeed is unknown.
+
+    Close to the ground, in LOW, an aeroplane with a motor does not dive for speed: it sinks at `recovery_sink_m_s`.
+
+    s : record with `airspeed_m_s`, `airspeed_known`, `lift_m_s`, `mode`   e : record of EnergyParams
+    """
+    most_m_s = e.climb_per_margin_1_s * (airspeed_to_protect(s) - least_airspeed(s, e)) - e.recovery_sink_m_s
+    if s.mode == LOW and e.throttle_per_climb_s_m > 0.0:
+        return max(most_m_s, -e.recovery_sink_m_s)
+    return most_m_s
+
+
+@kernel
+def steepest_bank(s, e):  # type: ignore[no-untyped-def]
+    """Largest bank, rad, of a level turn 10 % above its stalling speed, which grows with 1 / sqrt(cos bank)."""
+    slowest_m_s = TURN_MARGIN * (e.inverted_stall_m_s if s.inverted else e.stall_m_s)
+    return math.acos(min((slowest_m_s / airspeed_to_protect(s)) ** 2, 1.0))
+
+
+@kernel
 def throttle_of(energy_m_s, trim, s, e):  # type: ignore[no-untyped-def]
     """Throttle, 0..1, for an energy rate, and the rate it can deliver, m/s of climb; `trim` is for zero."""
     level = trim + s.throttle_integral
@@ -252,17 +299,17 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     s : record with `climb_integral_rad`, `throttle_integral`, updated, and the results of `believe_airspeed`
     """
     e = p.energy
+    most_m_s = most_climb(s, e)
     trim_rad, trim = level_flight(s, e)
     missing_m = height_m - height(row, p.guidance)
     climb_m_s = sinking_m_s = 0.0
     if math.isfinite(missing_m):
         climb_m_s = clip(e.climb_per_height_1_s * missing_m, -e.sink_limit_m_s, e.climb_limit_m_s)
         sinking_m_s = row.gps_v_e_m_s[2]  # velocity down
-    gain_m_s, most_m_s = 0.0, math.inf
+    gain_m_s = 0.0
     if s.airspeed_known:
         gain_m_s2 = e.gain_per_speed_1_s * (s.airspeed_wanted_m_s - s.airspeed_m_s)
         gain_m_s = s.airspeed_m_s / G_M_S2 * clip(gain_m_s2, -e.gain_limit_m_s2, e.gain_limit_m_s2)
-        most_m_s = e.climb_per_margin_1_s * (s.airspeed_m_s - least_airspeed(s, e)) - e.recovery_sink_m_s
     energy_m_s = climb_m_s + gain_m_s
     throttle, given_m_s = throttle_of(energy_m_s, trim, s, e)
     climb_m_s = min(e.height_weight * climb_m_s + (1.0 - e.height_weight) * (given_m_s - gain_m_s), most_m_s)

@@ -29,7 +29,7 @@ class GuidanceParams:
         gentle turns also in light headwind; lower: the heading may be lost when drifting backwards
     least_agility : fraction of the bank kept at the lowest ground speed (default 0.3).  Higher: faster turns
     blown : wind over cruise speed beyond which circles and routes take the direction from GPS velocity and wind instead
-        of an estimator's course (default 0.5).  Higher: the course is lost in turns in strong wind; lower: noisier turns
+        of an estimator's course (default 0.5).  Higher: the course is lost in strong wind; lower: noisier turns
     wind_share : largest wind used for navigation, over the airspeed (default 0.8).  Higher: more crab in strong wind
     gps_filter_s : age of a fix beyond its time stamp, due to the receiver's filter (s, default 1).  Wrong: the track is
         offset in turns

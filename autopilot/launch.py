@@ -7,8 +7,9 @@ not a throw; the acceleration is averaged against sway and knocks.
 import math
 from dataclasses import dataclass
 
-from autopilot.energy import hold_height, throttle_for
+from autopilot.energy import hold_height, most_climb, throttle_for
 from autopilot.guidance import height
+from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2
 from estimator.params.shared import FORCE_RANGE_M_S2
@@ -71,5 +72,8 @@ def climb_away(thrown_s, height_m, row, s, p, dt_s):  # type: ignore[no-untyped-
         return hold_height(height_m, row, s, p, dt_s)
     if thrown_s < launch.motor_delay_s:
         return launch.climb_pitch_rad, 0.0
-    throttle = 1.0 if thrown_s < launch.full_throttle_s else throttle_for(launch.climb_pitch_rad, s, p.energy)
-    return launch.climb_pitch_rad, throttle
+    if thrown_s < launch.full_throttle_s:
+        return launch.climb_pitch_rad, 1.0
+    steepest_rad = p.energy.pitch_trim_rad + most_climb(s, p.energy) / s.airspeed_wanted_m_s
+    pitch_rad = clip(steepest_rad, -p.energy.pitch_limit_rad, launch.climb_pitch_rad)
+    return pitch_rad, throttle_for(launch.climb_pitch_rad, s, p.energy)

@@ -8,6 +8,7 @@ import numpy as np
 from autopilot.interface import Mode
 from autopilot.pilot import Script
 from estimator.interface import Health
+from sim.aeroplane.battery import Battery
 from sim.faults import Fault
 from sim.log import Event, Flight, Log, Outcome, Phase
 
@@ -94,3 +95,9 @@ def events_of_faults(faults: Sequence[Fault], flight: Flight) -> tuple[Event, ..
         begins_s, ends_s = max(flight.release_s + fault.from_s, 0.0), flight.release_s + fault.to_s
         events += [Event(begins_s, f"fault {fault}", "warn"), Event(ends_s, f"fault {fault} ended")]
     return tuple(event for event in events if event.t_s <= last_s)
+
+
+def events_of_battery(battery: Battery) -> tuple[Event, ...]:
+    """The moment at which the speed controller began to take the motor back."""
+    cut_off_s = battery.figures["cut_off_s"]
+    return () if cut_off_s is None else (Event(cut_off_s, "battery low: motor cut off", "warn"),)

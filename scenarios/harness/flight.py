@@ -15,14 +15,16 @@ from estimator.interface import HeadingReference
 from scenarios.harness.aboard import equipped_estimator, instruments_of
 from scenarios.harness.config import FlightConfig, InFlightStart, fitted_suite, overridden, resolve
 from scenarios.harness.config.faults import parse_fault
-from scenarios.harness.config.plant import build_plant
+from scenarios.harness.config.plant import battery_of, build_plant
+from scenarios.harness.config.tolerances import require_sound
 from scenarios.harness.equipping import Equipped, equipped_autopilot, heading_reference_of, learnt
 from scenarios.harness.own_files import library_named
 from scenarios.harness.plugins import Maker, PluginError, maker_name
 from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario, ScriptFailed
+from sim.aeroplane.battery import Battery
 from sim.clock import Rates
-from sim.events import events_of_faults
+from sim.events import events_of_battery, events_of_faults
 from sim.faults import Fault, of_family
 from sim.log import Event, Flight, Log, Outcome
 from sim.loop import Watch, fly
@@ -74,13 +76,15 @@ class Prepared:
         """Fly it; `watch` is called once a simulated second, see `sim.loop.fly`.
 
         The manifest also holds ``on_ground``, the mean inertial sample from before a flight that starts in the air,
-        if there is one; ``known_to_estimator``, what the estimator was given of the instruments or has learnt; and
-        ``scenario_fault``, what went wrong in the scenario's own functions.
+        if there is one; ``known_to_estimator``, what the estimator was given of the instruments or has learnt;
+        ``battery``, what was drawn from it, if it is simulated; and ``scenario_fault``, what went wrong in the
+        scenario's own functions.
         """
         config, rates, manifest = self.config, self.rates, self.manifest
         if isinstance(self.script, ScriptFailed):
             return _unflown(str(self.script), rates, self.heading_reference, manifest)
-        plant, faults = build_plant(config, rates), [parse_fault(fault) for fault in config.faults]
+        faults = [parse_fault(fault) for fault in config.faults]
+        plant = build_plant(config, rates, faults)
         airborne = isinstance(config.start, InFlightStart)
         on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight) if airborne else None
         flown = fly(
@@ -95,7 +99,7 @@ class Prepared:
             manifest=manifest | ({} if on_ground is None else {"on_ground": plain(on_ground._asdict())}),
             watch=watch,
         )
-        return _with_events(flown, self.scenario, faults, self.estimator)
+        return _with_events(_with_battery(flown, battery_of(plant)), self.scenario, faults, self.estimator)
 
 
 def prepare(
@@ -150,6 +154,7 @@ def _prepare(
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
     config = resolve(config, suite)
+    require_sound(config.airframe, config.aircraft, config.rates.physics_hz, config.flies)
     instruments = instruments_of(config, suite)
     estimator, config = equipped_estimator(config, suite, instruments, maker)
     reference = heading_reference_of(estimator.code)
@@ -198,6 +203,14 @@ def _unflown(why: str, rates: Rates, reference: HeadingReference, manifest: dict
     """A flight that did not begin because its script raised."""
     events = (Event(0.0, why, "error"),)
     return Flight(Log.empty(0), rates.dt_s, 0.0, Outcome.SCENARIO_FAILED, reference, why, events, manifest)
+
+
+def _with_battery(flown: Flight, battery: Battery | None) -> Flight:
+    """`flown` with the figures and events of its battery, if it has one."""
+    if battery is None:
+        return flown
+    events = (*flown.events, *events_of_battery(battery))
+    return replace(flown, events=events, manifest=flown.manifest | {"battery": battery.figures})
 
 
 def _with_events(flown: Flight, scenario: Scenario, faults: list[Fault], estimator: Equipped) -> Flight:

@@ -7,7 +7,6 @@ the kernel of `sim.aeroplane.jsbsim_plant` that converts a tick to SI.
 import math
 import tomllib
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import jsbsim
@@ -15,6 +14,7 @@ import numpy as np
 
 from autopilot.interface import ActuatorCommand
 from estimator.interface import Array
+from sim.aeroplane.built import AIRCRAFT, AS_DRAWN, AsBuilt, model_folder
 from sim.air import Air
 from sim.place import LATITUDE_DEG, LONGITUDE_DEG
 from sim.truth import EARTH_RATE_RAD_S
@@ -24,8 +24,6 @@ LB_TO_N = 4.4482216152605
 LBFT_TO_NM = LB_TO_N * FT_TO_M
 SLUG_TO_KG = LB_TO_N / FT_TO_M
 SLUGFT2_TO_KGM2 = SLUG_TO_KG * FT_TO_M**2
-
-AIRCRAFT = Path(__file__).parents[1] / "aircraft"
 
 WRITE = ("fcs/aileron-cmd-norm", "fcs/elevator-cmd-norm", "fcs/rudder-cmd-norm", "fcs/throttle-cmd-norm")
 WIND = tuple(f"atmosphere/wind-{d}-fps" for d in ("north", "east", "down"))
@@ -44,10 +42,15 @@ class _Silent(jsbsim.FGLogger):
 _SILENT = _Silent()
 
 
+def _offset(write: Callable[[float], None], off: float) -> Callable[[float], None]:
+    return lambda value: write(value + off)
+
+
 class Model:
     """One JSBSim aeroplane in SI units: loading, placing, wind; each property name is resolved once."""
 
-    def __init__(self, aircraft: str, physics_hz: int) -> None:
+    def __init__(self, aircraft: str, physics_hz: int, built: AsBuilt = AS_DRAWN) -> None:
+        self.built = built
         self.folder = AIRCRAFT / aircraft
         known = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
         if aircraft not in known:
@@ -57,8 +60,9 @@ class Model:
         jsbsim.set_logger(_SILENT)  # for each model: JSBSim keeps a logger per thread
         self.fdm = jsbsim.FGFDMExec(str(self.folder))  # not its own data, absent in some installations
         self.fdm.set_dt(self.dt_s)  # before loading, which computes the servo lags
-        if not self.fdm.load_model_with_paths(aircraft, str(AIRCRAFT), str(self.folder), str(self.folder)):
-            raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")
+        with model_folder(self.folder, built) as (models, engine):
+            if not self.fdm.load_model_with_paths(aircraft, models, engine, str(self.folder)):
+                raise RuntimeError(f"JSBSim could not load the aircraft '{aircraft}'")
         self.run = self.fdm.run
         self._properties = self.fdm.get_property_manager()
         self._integrators = [(self.setter(p), self.getter(p)()) for p in INTEGRATORS]
@@ -76,6 +80,12 @@ class Model:
     def setter(self, name: str) -> Callable[[float], None]:
         """Bound method that writes the property `name`, in JSBSim's unit."""
         return self._node(name).set_double_value  # type: ignore[no-any-return]
+
+    def servo_setters(self) -> tuple[Callable[[float], None], ...]:
+        """Setters of aileron, elevator, rudder and throttle; each surface is off by its trim."""
+        aileron, elevator, rudder, throttle = (self.setter(name) for name in WRITE)
+        off = zip((aileron, elevator, rudder), self.built.trims, strict=True)
+        return (*(_offset(write, trim) if trim else write for write, trim in off), throttle)
 
     def has(self, name: str) -> bool:
         return self._properties.get_node(name) is not None
@@ -105,10 +115,13 @@ class Model:
         return LB_TO_N * float(self.get("propulsion/engine/thrust-lbs")[0]) if self.powered else 0.0
 
     def inertia_tensor_kg_m2(self) -> Array:
-        """Inertia about the centre of gravity, body axes, shape (3, 3), off-diagonal elements negated products."""
+        """Inertia about the centre of gravity, body axes, shape (3, 3), off-diagonal elements negated products.
+
+        JSBSim's properties are the elements: ``inertia/ixz-slugs_ft2`` is the negated product.
+        """
         names = ("ixx", "iyy", "izz", "ixy", "iyz", "ixz")
         xx, yy, zz, xy, yz, xz = SLUGFT2_TO_KGM2 * self.get(*(f"inertia/{name}-slugs_ft2" for name in names))
-        return np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     def wing(self) -> tuple[float, float, float]:
         """Reference quantities of the coefficients: area [m2], span and mean chord [m]."""
@@ -153,7 +166,7 @@ class Model:
         self.put({"atmosphere/turb-type": 0.0})  # not JSBSim's: referred to sea level, and wrong in oblique winds
         self.push(np.zeros(3), np.zeros(3))
         self.fdm.run_ic()  # resets commands and wind
-        self.put(dict(zip(WRITE, command[:4], strict=True)))
+        self.put(dict(zip(WRITE, self.built.servos(command)[:4], strict=True)))
         wind_e = air.mean_wind_e_m_s(height_m)
         self.put({name: float(w) / FT_TO_M for name, w in zip(WIND, wind_e, strict=True)})
         self.fdm.set_trim_status(True)  # servos jump to their commands

@@ -6,6 +6,7 @@ truth row in SI units.  The inertial means of the row come from the change of at
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from struct import Struct
 
@@ -15,10 +16,14 @@ from autopilot.interface import NEUTRAL, ActuatorCommand
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.aeroplane import hand
-from sim.aeroplane.jsbsim_model import FT_TO_M, LB_TO_N, WIND, WRITE, Model
+from sim.aeroplane.actuators import Actuators
+from sim.aeroplane.battery import BatteryParams
+from sim.aeroplane.built import AS_DRAWN, AsBuilt
+from sim.aeroplane.jsbsim_model import FT_TO_M, LB_TO_N, WIND, Model
 from sim.aeroplane.trim import Trim, trim
 from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
+from sim.faults import Fault
 from sim.log import Log, Outcome, Phase
 from sim.place import LATITUDE_DEG
 from sim.plant import HandThrow, InFlight, SimulationDiverged, Start
@@ -133,19 +138,23 @@ class JsbsimPlant:
     rates : physics and inertial rates
     seed, flight : of the random streams (used here only by turbulence)
     box : limits of the flight; a start outside is rejected
+    faults : of surfaces and motor (`sim.aeroplane.actuators`)
+    battery : None gives a constant voltage
+    built : how the aeroplane differs from its drawing
 
-    Raises ValueError for an unknown aircraft or an impossible start.
+    Raises ValueError for an unknown aircraft, an impossible start or fault, or a battery without a motor.
     """
 
     def __init__(
         self, aircraft: str = "endurance", *, start: Start, air: Air = STILL, rates: Rates | None = None,
-        seed: int = 0, flight: int = 0, box: FlightBox | None = None,
+        seed: int = 0, flight: int = 0, box: FlightBox | None = None, faults: Sequence[Fault] = (),
+        battery: BatteryParams | None = None, built: AsBuilt = AS_DRAWN,
     ) -> None:  # fmt: skip
         rates = rates or Rates()
         box = box or FlightBox()
         self.start, self.air = start, air
         self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
-        self._physics_hz, self._aircraft = rates.physics_hz, aircraft
+        self._physics_hz, self._aircraft, self._built = rates.physics_hz, aircraft, built
         self._hold_ticks = self._release_tick = self._hand_ticks = 0
         if isinstance(start, HandThrow):
             hand.check(start)
@@ -153,6 +162,7 @@ class JsbsimPlant:
             self._release_tick = self._hold_ticks + max(1, rates.ticks(start.push_s))
             self._hand_ticks = self._release_tick + 1  # the first tick of the flight restores the integrator
         self.release_s = self._release_tick * self.dt_s
+        self._faults, self._battery = tuple(faults), battery
         self._load()
         span_m = FT_TO_M * float(self.model.get("metrics/bw-ft")[0])
         self._moving_air = MovingAir(air, span_m, self.dt_s, self.release_s, seed, flight)
@@ -181,12 +191,15 @@ class JsbsimPlant:
 
     def _load(self) -> None:
         """A new JSBSim for each flight: a diverged state survives any reset."""
-        self.model = Model(self._aircraft, self._physics_hz)
+        self.model = Model(self._aircraft, self._physics_hz, self._built)
         self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
-        self._aileron, self._elevator, self._rudder, self._throttle = (self.model.setter(p) for p in WRITE)
+        self._aileron, self._elevator, self._rudder, self._throttle = self.model.servo_setters()
         self._wind = tuple(self.model.setter(p) for p in WIND)
         self._air_rates = tuple(self.model.setter(p) for p in AIR_RATES if self.model.has(p))
         self._pack = Struct(f"{len(self._getters)}d").pack_into
+        self.actuators: Actuators | None = None
+        if self._faults or self._battery is not None:
+            self.actuators = Actuators(self.model, self._faults, self._battery, self.release_s, self.dt_s)
 
     def reset(self, log: Log) -> None:
         """Put the aeroplane at its start; the rows of `log` are filled from tick 0."""
@@ -242,7 +255,7 @@ class JsbsimPlant:
             self._blow(*self._moving_air.blow(self._truth, k))
         if k < self._hand_ticks:
             return self._in_hand(k, command)
-        self._command(command)
+        self._command(k, command)
         run = self.model.run
         try:
             for _ in range(self.steps):
@@ -258,7 +271,9 @@ class JsbsimPlant:
         for write, rate_rad_s in zip(self._air_rates, air[3:], strict=False):  # optional in a model
             write(rate_rad_s)
 
-    def _command(self, command: ActuatorCommand) -> None:
+    def _command(self, k: int, command: Sequence[float]) -> None:
+        if self.actuators is not None:
+            command = self.actuators.move(k, command)
         self._aileron(command[0])
         self._elevator(command[1])
         self._rudder(command[2])
@@ -290,7 +305,7 @@ class JsbsimPlant:
             return None
         if k == self._hold_ticks:
             self._begin_push(start)
-        self._command(command)
+        self._command(k, command)
         first = (k - self._hold_ticks) * self.steps
         last = (self._release_tick - self._hold_ticks) * self.steps
         for step in range(first + 1, first + self.steps + 1):

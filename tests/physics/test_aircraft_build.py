@@ -1,5 +1,6 @@
 """From outline and masses to the model: the files are what build.py writes, and its parts meet closed forms."""
 
+import importlib
 import json
 import re
 import subprocess
@@ -13,7 +14,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sim.aeroplane.jsbsim_model import AIRCRAFT
+from sim.aeroplane.jsbsim_model import AIRCRAFT, Model
+from sim.aeroplane.trim import accelerations, trim
 from sim.aircraft.design import aerodynamics, builder
 from sim.aircraft.design.lattice import Attached, flap_effectiveness
 from sim.aircraft.design.masses import Box, Spread, balance
@@ -203,3 +205,15 @@ def test_every_aeroplane_says_where_its_figures_come_from(name):
     """PROVENANCE.md stands beside each model."""
     text = (Path(AIRCRAFT) / name / "PROVENANCE.md").read_text()
     assert text.count("assumption") > 10
+
+
+@pytest.mark.parametrize("aircraft", ["endurance", "gentle_lady"])
+def test_moments_turn_the_aeroplane_by_euler_with_the_inertia_of_its_parts(aircraft):
+    """I dw = M in JSBSim, with the tensor summed here from the parts: its products have the sign of JSBSim's file."""
+    design = importlib.import_module(f"sim.aircraft.{aircraft}.build").DESIGN
+    model = Model(aircraft, 200)
+    t = trim(model, model.airframe["cruise"]["airspeed_m_s"])
+    turning = accelerations(model, replace(t, rudder=0.5), 60.0)[3:]
+    moment = model.force_and_moment()[1]
+    np.testing.assert_allclose(design.balance.inertia_kg_m2 @ turning, moment, rtol=0, atol=1e-3 * abs(moment[2]))
+    np.testing.assert_allclose(model.inertia_tensor_kg_m2(), design.balance.inertia_kg_m2, rtol=0, atol=2e-5)

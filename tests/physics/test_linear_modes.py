@@ -118,7 +118,7 @@ def test_phugoid_frequency_and_damping_are_those_of_a_flight(flown):
 
 
 # What the formulas leave out: the two-state short period the speed, the roll the rest, the Dutch roll the rolling,
-# which matters most with much dihedral.  Usual errors of the books: 5, 5, 20 to 30, 20 to 30 %.
+# which matters most with much dihedral.  Usual errors of the books, of the mode: 5, 5, 20 to 30, 20 to 30 %.
 WITHIN = {"short_period": 0.10, "roll": 0.10, "phugoid": 0.20, "dutch_roll": 0.30, "spiral": 0.30}
 
 
@@ -126,8 +126,8 @@ WITHIN = {"short_period": 0.10, "roll": 0.10, "phugoid": 0.20, "dutch_roll": 0.3
 def test_mode_lies_near_its_textbook_formula(flown, name):
     _, linear, by_name = flown
     formula = textbook(linear)[name]
-    assert by_name[name].omega_rad_s == pytest.approx(formula.omega_rad_s, rel=WITHIN[name])
-    assert by_name[name].damping == pytest.approx(formula.damping, rel=WITHIN[name])
+    assert formula.omega_rad_s == pytest.approx(by_name[name].omega_rad_s, rel=WITHIN[name])
+    assert formula.damping == pytest.approx(by_name[name].damping, rel=WITHIN[name])
 
 
 def test_bairstow_and_lanchester_agree_where_pitch_is_stiff_and_thrust_constant():

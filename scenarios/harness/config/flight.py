@@ -14,8 +14,10 @@ from estimator.instruments import PROPERTIES, property_names, property_value
 from estimator.interface import MEASURED_DTYPE
 from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios find it beside the rest
 from scenarios.harness.config.air import parse_wind, resolve_air
+from scenarios.harness.config.battery import BatteryConfig
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
 from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
+from scenarios.harness.config.tolerances import AirframeConfig, TolerancesConfig, resolve_airframe
 from scenarios.harness.config.validation import validated
 from scenarios.harness.plugins import Maker
 from scenarios.harness.seeds import LARGEST_SEED
@@ -77,6 +79,7 @@ class FlightConfig(_Model):
     turn_table : the magnetometer was turned on a table before the flight: an estimator with a parameter
     ``calibration`` is given the result, see `aboard`
     files : path -> text of the user's own sensor files; a resolved configuration holds them
+    airframe, tolerances : differences of the aeroplane from its drawing, and the deviations they are drawn from
     manoeuvre : the scenario's own parameters
     faults : of sensors, surfaces and motor, each as text, ``gyro.x:stuck@20-25``, see `config.faults.parse_fault`
     box_radius_m, box_height_m : of the cylinder around the launch point; the flight ends when it is left
@@ -96,7 +99,10 @@ class FlightConfig(_Model):
     turn_table: bool = False
     files: dict[str, str] = Field(default_factory=dict)
     faults: tuple[str, ...] = ()
+    battery: BatteryConfig = Field(default_factory=BatteryConfig)
     air: AirConfig = Field(default_factory=AirConfig)
+    airframe: AirframeConfig = Field(default_factory=AirframeConfig)
+    tolerances: TolerancesConfig = Field(default_factory=TolerancesConfig)
     start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
     box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
@@ -147,6 +153,11 @@ class FlightConfig(_Model):
         if isinstance(heading_deg, str):
             raise ValueError(f"start.heading_deg = {heading_deg!r}: resolve the configuration first")
         return heading_deg
+
+    @property
+    def flies(self) -> bool:
+        """Whether it leaves the table."""
+        return not isinstance(self.start, BenchStart)
 
     @property
     def held_s(self) -> float:
@@ -200,6 +211,7 @@ def overridden(
     fitted = change_params(unchanged, changed.sensors, f"sensor suite {changed.suite}")
     flies = not isinstance(changed.start, BenchStart)
     require_faults_possible(changed.faults, fitted, changed.rates.gps_hz, changed.aircraft, flies)
+    changed.battery.require_possible(changed.aircraft, flies)
     if changed.turn_table and fitted.magnetometer is None:
         raise ValueError(f"turn_table = True: sensor suite {changed.suite} has no magnetometer to be turned")
     return changed, fitted
@@ -302,10 +314,11 @@ def resolve(config: FlightConfig, suite: SuiteParams | None = None) -> FlightCon
     """
     start = resolve_start(config.start, config.seed, config.flight)
     air = resolve_air(config.air, start.heading_deg, config.seed, config.flight)
-    files = config.files or own_files(config.suite)
-    return config.model_copy(
-        update={"start": start, "air": air, "files": files, "rates": _resolve_rates(config, suite)}
+    files, rates = config.files or own_files(config.suite), _resolve_rates(config, suite)
+    airframe = resolve_airframe(
+        config.airframe, config.tolerances, config.aircraft, config.flies, config.seed, config.flight
     )
+    return config.model_copy(update={"start": start, "air": air, "airframe": airframe, "files": files, "rates": rates})
 
 
 def _resolve_rates(config: FlightConfig, suite: SuiteParams | None) -> RatesConfig:

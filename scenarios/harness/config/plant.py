@@ -1,18 +1,22 @@
 """The plant of a configuration: the aeroplane in its air, or the instruments on a table."""
 
 import math
+from collections.abc import Sequence
 
 from scenarios.harness.config.air import build_air
 from scenarios.harness.config.flight import FlightConfig
 from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStart
+from scenarios.harness.config.tolerances import built
+from sim.aeroplane.battery import Battery
 from sim.aeroplane.jsbsim_plant import FlightBox, JsbsimPlant
 from sim.clock import Rates
+from sim.faults import Fault, of_family
 from sim.motion.prescribed_plant import PrescribedPlant, Rest
 from sim.plant import HandThrow, InFlight, Plant, Start
 
 
-def build_plant(config: FlightConfig, rates: Rates) -> Plant:
-    """The plant of a resolved configuration."""
+def build_plant(config: FlightConfig, rates: Rates, faults: Sequence[Fault] = ()) -> Plant:
+    """The plant of a resolved configuration; of `faults` it has those of surfaces and motor."""
     start = config.start
     if isinstance(start, BenchStart):
         roll_rad, pitch_rad, heading_rad = _radians((start.roll_deg, start.pitch_deg, config.heading_deg))
@@ -26,7 +30,16 @@ def build_plant(config: FlightConfig, rates: Rates) -> Plant:
         seed=config.seed,
         flight=config.flight,
         box=FlightBox(config.box_radius_m, config.box_height_m),
+        faults=of_family("actuator", faults),
+        battery=config.battery.build(),
+        built=built(config.airframe),
     )
+
+
+def battery_of(plant: Plant) -> Battery | None:
+    """The battery of a plant that has one."""
+    actuators = plant.actuators if isinstance(plant, JsbsimPlant) else None
+    return actuators.battery if actuators is not None else None
 
 
 def build_start(config: FlightConfig) -> Start:

@@ -22,7 +22,7 @@ def _metrics_and_mass(d: Design) -> str:
   {location(at, "EYEPOINT")}
   {location(at, "VRP")}
 </metrics>
-<mass_balance negated_crossproduct_inertia="true">
+<mass_balance negated_crossproduct_inertia="false">
   <ixx unit="KG*M2">{i[0, 0]:.5f}</ixx>
   <iyy unit="KG*M2">{i[1, 1]:.5f}</iyy>
   <izz unit="KG*M2">{i[2, 2]:.5f}</izz>
