@@ -11,12 +11,14 @@ from types import MappingProxyType
 
 from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
+from autopilot.fence import FenceParams
 from autopilot.guidance import GuidanceParams
 from autopilot.launch import LaunchParams
 from autopilot.lift import LiftParams
 from autopilot.mixer import MixerParams
 from autopilot.route import RouteParams
 from autopilot.stabilise import StabiliseParams
+from autopilot.standby import StandbyParams
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,8 @@ class AutopilotParams:
     mixer: MixerParams = field(default_factory=MixerParams)
     route: RouteParams = field(default_factory=RouteParams)
     failsafe: FailsafeParams = field(default_factory=FailsafeParams)
+    standby: StandbyParams = field(default_factory=StandbyParams)
+    fence: FenceParams = field(default_factory=FenceParams)
 
 
 # Steeper than the best glide (6.3 m/s, pitch -2.6 degrees): airspeed is not measured, and a pitch estimate 5 degrees

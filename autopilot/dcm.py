@@ -1,7 +1,7 @@
 """The autopilot that steers on the direction cosine matrix: its modes, its state, and one kernel per tick."""
 
 import math
-from dataclasses import astuple, fields
+from dataclasses import astuple, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,8 @@ from autopilot.energy import (
     throttle_to_recover,
     want_airspeed,
 )
-from autopilot.failsafe import circle, examine, listen, mode_in_force
+from autopilot.failsafe import circle, end_blind_climb, examine, listen, mode_in_force
+from autopilot.fence import FenceParams, ceiling
 from autopilot.guidance import (
     agility,
     bank_for_heading,
@@ -33,6 +34,7 @@ from autopilot.interface import (
     CIRCLE,
     COURSE,
     GLIDE,
+    LAND,
     LAUNCH,
     LEVEL,
     LOITER,
@@ -53,7 +55,7 @@ from autopilot.route import bank_along_route, bank_to_circle
 from autopilot.stabilise import rate_control, rate_demand
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
-from estimator.interface import POOR, AttitudeEstimate, HeadingReference, Measurements
+from estimator.interface import AttitudeEstimate, HeadingReference, Measurements
 
 
 def _floats(params: type[Any]) -> np.dtype[Any]:
@@ -103,14 +105,26 @@ _STATE = np.dtype(
         ("silent_s", "f8"),  # since the last fix arrived
         ("heard_s", "f8"),  # since the last GPS outage
         ("circled_s", "f8"),  # in circles without a position
+        ("fixed", "i8"),  # a fix has arrived at some time
+        ("unheard_s", "f8"),  # since the radio link was lost
+        ("setpoints", "i8"),  # number of different setpoints received
+        ("fenced", "i8"),  # the fence determines the mode
+        ("fenced_by", "i8"),  # number of the setpoint under which it acted
         ("low", "i8"),  # too close to the ground
         ("believed", "i8"),  # whether the estimator is trusted
         ("healthy_once", "i8"),
         ("poor_s", "f8"),  # time the estimator has been unhealthy, decreasing while it is healthy
-        ("R_kept_eb", "f8", (3, 3)),  # attitude of the last healthy estimate, propagated
+        ("apart_s", "f8"),  # time it has been no number, or POOR and far from the standby attitude
+        ("unwell_s", "f8"),  # since the last healthy estimate
+        ("alone_s", "f8"),  # in LEVEL without GPS or radio link
+        ("helped_s", "f8"),  # in LEVEL with both
+        ("R_kept_eb", "f8", (3, 3)),  # the standby attitude: that of the last healthy estimate, carried on
         ("bias_kept_b_rad_s", "f8", (3,)),  # its gyro bias
-        ("wind_kept_e_m_s", "f8", (3,)),  # its wind, NaN if unknown
-        ("omega_kept_b_rad_s", "f8", (3,)),
+        ("wind_kept_e_m_s", "f8", (3,)),  # the last healthy wind, NaN if unknown
+        ("omega_kept_b_rad_s", "f8", (3,)),  # rate of the standby attitude
+        ("turn_kept_b_rad_s", "f8", (3,)),  # the same with the corrections
+        ("force_last_b_m_s2", "f8", (3,)),  # last specific force
+        ("force_frozen_s", "f8"),  # time for which it has not changed
         ("height_kept_m", "f8"),  # at the start of LEVEL
     ],
     align=True,
@@ -167,6 +181,8 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
     limit_rad, wanted_m = min(setpoint.bank_limit_rad, p.bank_limit_rad), setpoint.height_m
     if s.led_by != setpoint.mode or not setpoint.radio:  # return even if the last bank limit was tiny
         limit_rad = max(limit_rad, failsafe.bank_rad)
+    if s.fenced:
+        limit_rad = max(limit_rad, min(me.p.fence.bank_rad, p.bank_limit_rad))
     if s.mode == LOW:
         limit_rad = min(limit_rad, failsafe.low_bank_rad)
     limit_rad = min(limit_rad, max(steepest_bank(s, me.p.energy), failsafe.low_bank_rad))
@@ -176,10 +192,12 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
     if s.led_by == RETURN:
         bank = bank_to_return(north, east, r_zy, row, s, limit_rad, p)
     elif s.led_by == LOITER:
+        centre_north, centre_east, radius_m = setpoint.north_m, setpoint.east_m, setpoint.radius_m
+        if s.fenced:
+            centre_north, centre_east, radius_m = 0.0, 0.0, min(radius_m, 0.5 * me.p.fence.radius_m)
         bank = bank_to_circle(
-            north, east, r_zy, row, s, limit_rad,
-            setpoint.north_m, setpoint.east_m, setpoint.radius_m, setpoint.left, me.p.route, p,
-        )  # fmt: skip
+            north, east, r_zy, row, s, limit_rad, centre_north, centre_east, radius_m, setpoint.left, me.p.route, p
+        )
     elif s.led_by == WAYPOINTS:
         bank, wanted_m = bank_along_route(
             north, east, r_zy, wind_e_m_s, row, height_m, setpoint, s, limit_rad, me.p.route, p
@@ -187,6 +205,7 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
     else:
         sine, cosine = heading_error(north, east, math.cos(setpoint.course_rad), math.sin(setpoint.course_rad))
         bank = bank_for_heading(sine, cosine, r_zy, limit_rad, p)
+    wanted_m = min(wanted_m, ceiling(me.p.fence))
     if s.mode == LOW:
         wanted_m = max(wanted_m, height_m + failsafe.climb_m)
     pitch, throttle = hold_height(wanted_m, row, s, me.p, dt_s)
@@ -194,17 +213,19 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
 
 
 @kernel
-def guide(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
+def guide(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
     """Bank and pitch demand, rad, and throttle of all modes with an attitude demand; `me` is the memory."""
     setpoint, s = me.setpoint, me.s
     if s.mode == STABILISE:
         return setpoint.bank_rad, setpoint.pitch_rad, throttle_for(setpoint.pitch_rad, s, me.p.energy)
     if s.mode == LAUNCH:
         thrown_s = feel_throw(R_eb, row, s, me.p.launch, dt_s)
-        pitch, throttle = climb_away(thrown_s, setpoint.height_m, row, s, me.p, dt_s)
+        wanted_m = min(setpoint.height_m, ceiling(me.p.fence))
+        end_blind_climb(wanted_m, row, s, me.p)
+        pitch, throttle = climb_away(thrown_s, wanted_m, row, s, me.p, dt_s)
         return 0.0, pitch, throttle
-    if s.mode in (CIRCLE, GLIDE, LEVEL):
-        return circle(s.mode, row, s, me.p, dt_s)
+    if s.mode in (CIRCLE, GLIDE, LEVEL, LAND):
+        return circle(s.mode, R_eb, omega_b_rad_s, row, s, me.p, dt_s)
     return lead(R_eb, wind_e_m_s, row, height_m, me, dt_s)
 
 
@@ -218,7 +239,7 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
         demand = (rate[0], rate[1], rate[2])
         throttle = me.p.energy.throttle_trim
     else:
-        bank, pitch, throttle = guide(R_eb, wind_e_m_s, row, height_m, me, dt_s)
+        bank, pitch, throttle = guide(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
         throttle = throttle_to_recover(R_eb[2, 0], pitch, throttle)
         up = -1.0 if s.inverted else 1.0
         demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, up, s.airspeed_m_s, me.p.stabilise)
@@ -273,15 +294,14 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
         for j in range(3):
             known = known and math.isfinite(R_eb[i, j])
     listen(row, s, p.failsafe, dt_s)
-    reported = health if known else POOR
-    examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, reported, row, s, p.failsafe, p.guidance, dt_s)
+    examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, known, row, s, p, dt_s)
     if setpoint.mode != s.setpoint_mode:
         ask(setpoint.mode, s)
     height_m = height(row, p.guidance)
-    mode, led_by = mode_in_force(setpoint, height_m, s, p.failsafe, dt_s)
+    mode, led_by = mode_in_force(setpoint, height_m, row, s, p, dt_s)
     if mode != s.mode or led_by != s.led_by:
         enter(mode, led_by, height_m, s)
-    if mode == LEVEL and not s.believed:  # the estimate is not used
+    if mode in (LEVEL, LAND) and not s.believed:  # the estimate is not used
         return steer_on(s.R_kept_eb, s.omega_kept_b_rad_s, s.wind_kept_e_m_s, row, height_m, me, dt_s)
     if known:
         return steer_on(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
@@ -322,13 +342,16 @@ class DcmAutopilot:
     heading_reference   direction of the first column of the estimator's matrix: "course" over the ground, or "nose",
                         which needs the estimated wind to navigate; changes take effect at the next `reset`
     aircraft            name of the aircraft, see `autopilot.airframes`; ValueError if it has no gains
+    fence               the geofence, see `autopilot.fence`; None: that of the parameters, by default none
     """
 
     def __init__(
         self, params: AutopilotParams | None = None, heading_reference: HeadingReference = "course",
-        aircraft: str = "endurance",
+        aircraft: str = "endurance", fence: FenceParams | None = None,
     ) -> None:  # fmt: skip
         self.params = params or params_of(aircraft)
+        if fence is not None:
+            self.params = replace(self.params, fence=fence)
         self.heading_reference = heading_reference
         self.reset()
 
@@ -350,6 +373,8 @@ class DcmAutopilot:
         if setpoint is not self._setpoint:
             if self._setpoint is None or setpoint.route != self._setpoint.route:
                 self._memory["s"]["next_waypoint"] = self._memory["s"]["on_leg"] = 0
+            if setpoint != self._setpoint:
+                self._memory["s"]["setpoints"] += 1
             _write(setpoint, self._memory["setpoint"][0])
             self._setpoint = setpoint
         R_eb, omega, bias, wind, health = estimate

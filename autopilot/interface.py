@@ -9,7 +9,7 @@ from estimator.interface import AttitudeEstimate, Measurements
 
 
 class Mode(IntEnum):
-    """Flight modes.  The last four are failsafe modes, which cannot be commanded: see `autopilot.failsafe`."""
+    """Flight modes.  The last five are failsafe modes, which cannot be commanded: see `autopilot.failsafe`."""
 
     MANUAL = 0  # sticks move the surfaces
     RATE = 1  # sticks command body rates
@@ -21,12 +21,13 @@ class Mode(IntEnum):
     WAYPOINTS = 7  # along the legs of a route
     CIRCLE = 8  # no position: a gentle circle at the present place, at cruise
     GLIDE = 9  # no position for a long time: the same circle, motor off
-    LEVEL = 10  # no trusted attitude: wings level on the gyros alone
+    LEVEL = 10  # no trusted attitude: wings level on the standby attitude
     LOW = 11  # too close to the ground: climbs on course with little bank
+    LAND = 12  # no trusted attitude and nobody who can help: wings level, motor off
 
 
 # As plain integers, for kernels: numba is slow with enumerations.
-MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW = (int(m) for m in Mode)
+MANUAL, RATE, STABILISE, COURSE, RETURN, LAUNCH, LOITER, WAYPOINTS, CIRCLE, GLIDE, LEVEL, LOW, LAND = map(int, Mode)
 
 
 class Waypoint(NamedTuple):

@@ -24,6 +24,7 @@ _FAILSAFES = {
     Mode.GLIDE: "no GPS for a long time",
     Mode.LEVEL: "estimator unhealthy",
     Mode.LOW: "too close to the ground",
+    Mode.LAND: "estimator unhealthy, and no GPS or no radio",
 }
 
 
@@ -44,8 +45,9 @@ def events_of(
 
     if log.truth["phase"][0] != Phase.FLYING:
         events += [Event(float(t_s[k]), _PHASES[Phase(log.truth["phase"][k])]) for k in changes(log.truth["phase"])]
+    mode = log.flown["mode"]
     events += [
-        _mode_event(Mode(log.flown["mode"][k]), float(t_s[k]), script, release_s) for k in changes(log.flown["mode"])
+        _mode_event(Mode(mode[k]), Mode(mode[max(k - 1, 0)]), float(t_s[k]), script, release_s) for k in changes(mode)
     ]
     events += _radio_events(script, release_s, float(t_s[-1]))
     events += [
@@ -66,14 +68,16 @@ def events_of(
     return tuple(sorted(events, key=lambda e: e.t_s))
 
 
-def _mode_event(mode: Mode, t_s: float, script: Script | None, release_s: float) -> Event:
-    """The mode that became active at `t_s`; a warning with the reason for a failsafe."""
+def _mode_event(mode: Mode, before: Mode, t_s: float, script: Script | None, release_s: float) -> Event:
+    """The mode that became active at `t_s`, after the mode `before`; a warning with the reason for a failsafe."""
     setpoint = script.at(t_s - release_s) if script is not None else None
     text, reason = f"mode {mode.name.lower()}", _FAILSAFES.get(mode, "")
     if setpoint is not None and setpoint.mode == mode:
         reason = ""
-    elif setpoint is not None and not setpoint.radio and mode == Mode.RETURN:
-        reason = "no radio"
+    elif setpoint is not None and mode in (Mode.RETURN, Mode.LOITER):
+        reason = "no radio" if not setpoint.radio and mode == Mode.RETURN else "the fence"
+    elif setpoint is not None and mode == Mode.GLIDE and before not in (Mode.GLIDE, Mode.CIRCLE):
+        reason = "the fence" if setpoint.radio else "no radio for a long time"
     return Event(t_s, f"{text}: {reason}", "warn") if reason else Event(t_s, text)
 
 
@@ -85,6 +89,20 @@ def _radio_events(script: Script | None, release_s: float, last_s: float) -> lis
             heard = setpoint.radio
             events.append(Event(release_s + t_s, "radio back" if heard else "radio lost", "info" if heard else "warn"))
     return [event for event in events if event.t_s <= last_s]
+
+
+def events_of_fence(radius_m: float | None, height_m: float | None, flight: Flight) -> tuple[Event, ...]:
+    """Each time the aeroplane leaves the fence, in truth, and each time it comes back; None is no limit."""
+    if len(flight.log) == 0 or (radius_m is None and height_m is None):
+        return ()
+    p, t_s = flight.log.truth["p_e_m"], flight.log.truth["t_s"]
+    outside = np.hypot(p[:, 0], p[:, 1]) > (np.inf if radius_m is None else radius_m)
+    outside |= -p[:, 2] > (np.inf if height_m is None else height_m)
+    crossings = np.flatnonzero(np.diff(outside, prepend=False))
+    return tuple(
+        Event(float(t_s[k]), "outside the fence", "warn") if outside[k] else Event(float(t_s[k]), "inside the fence")
+        for k in crossings
+    )
 
 
 def events_of_faults(faults: Sequence[Fault], flight: Flight) -> tuple[Event, ...]:

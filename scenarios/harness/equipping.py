@@ -30,6 +30,7 @@ from sim.outside.wording import class_name, described, printable
 from sim.params import changed, dotted_fields, near_misses
 
 if TYPE_CHECKING:
+    from autopilot.fence import FenceParams
     from autopilot.interface import Autopilot
     from estimator.interface import AttitudeEstimator, HeadingReference
 
@@ -104,10 +105,22 @@ def _params(kind: Kind, spec: "str | Maker", code: object) -> Any:
 
 
 def equipped_autopilot(
-    spec: str, heading_reference: "HeadingReference", aircraft: str, instruments: Instruments
-) -> Equipped:
-    """A new autopilot by name that is given what is known of the instruments; errors as for `load_autopilot`."""
-    return _equipped(AUTOPILOT, spec, instruments, {}, heading_reference=heading_reference, aircraft=aircraft)
+    spec: str, heading_reference: "HeadingReference", aircraft: str, instruments: Instruments,
+    fence: "FenceParams | None" = None,
+) -> Equipped:  # fmt: skip
+    """A new autopilot by name that is given what is known of the instruments; errors as for `load_autopilot`.
+
+    fence : None is none; ValueError where there is one and the autopilot has no argument for it
+    """
+    also: dict[str, Any] = {"heading_reference": heading_reference, "aircraft": aircraft}
+    if fence is not None:
+        if "fence" not in arguments_of(AUTOPILOT, spec, find_maker(AUTOPILOT, spec)):
+            raise ValueError(
+                f"fence: autopilot {spec!r} has no argument 'fence' and would fly through it; use one that has, or "
+                "fence.action=report"
+            )
+        also["fence"] = fence
+    return _equipped(AUTOPILOT, spec, instruments, {}, **also)
 
 
 def _equipped(

@@ -13,7 +13,7 @@ import numpy as np
 from estimator.instruments import Instruments, Known, to_json
 from estimator.interface import HeadingReference
 from scenarios.harness.aboard import equipped_estimator, instruments_of
-from scenarios.harness.config import FlightConfig, InFlightStart, fitted_suite, overridden, resolve
+from scenarios.harness.config import FenceConfig, FlightConfig, InFlightStart, fitted_suite, overridden, resolve
 from scenarios.harness.config.faults import parse_fault
 from scenarios.harness.config.plant import battery_of, build_plant
 from scenarios.harness.config.tolerances import require_sound
@@ -24,7 +24,7 @@ from scenarios.harness.registry import find
 from scenarios.harness.scenario import Scenario, ScriptFailed
 from sim.aeroplane.battery import Battery
 from sim.clock import Rates
-from sim.events import events_of_battery, events_of_faults
+from sim.events import events_of_battery, events_of_faults, events_of_fence
 from sim.faults import Fault, of_family
 from sim.log import Event, Flight, Log, Outcome
 from sim.loop import Watch, fly
@@ -99,7 +99,8 @@ class Prepared:
             manifest=manifest | ({} if on_ground is None else {"on_ground": plain(on_ground._asdict())}),
             watch=watch,
         )
-        return _with_events(_with_battery(flown, battery_of(plant)), self.scenario, faults, self.estimator)
+        flown = _with_battery(flown, battery_of(plant))
+        return _with_events(flown, self.scenario, faults, self.estimator, config.fence)
 
 
 def prepare(
@@ -158,7 +159,7 @@ def _prepare(
     instruments = instruments_of(config, suite)
     estimator, config = equipped_estimator(config, suite, instruments, maker)
     reference = heading_reference_of(estimator.code)
-    autopilot = equipped_autopilot(config.autopilot, reference, config.aircraft, instruments)
+    autopilot = equipped_autopilot(config.autopilot, reference, config.aircraft, instruments, config.fence.build())
     try:
         script: Any = scenario.scripted(config)
     except ScriptFailed as problem:
@@ -213,10 +214,13 @@ def _with_battery(flown: Flight, battery: Battery | None) -> Flight:
     return replace(flown, events=events, manifest=flown.manifest | {"battery": battery.figures})
 
 
-def _with_events(flown: Flight, scenario: Scenario, faults: list[Fault], estimator: Equipped) -> Flight:
+def _with_events(
+    flown: Flight, scenario: Scenario, faults: list[Fault], estimator: Equipped, fence: FenceConfig
+) -> Flight:
     """`flown` with its events, and what the estimator learnt; whatever is wrong with these, the flight is kept."""
     milestones, fault = scenario.events(flown)
     events, manifest = (*flown.events, *events_of_faults(faults, flown), *milestones), dict(flown.manifest)
+    events += events_of_fence(fence.radius_m, fence.height_m, flown)
     outcome, message = flown.outcome, flown.message
     known: Mapping[str, Known] = estimator.known
     try:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from autopilot.airframes import params_of
 from autopilot.dcm import DcmAutopilot
+from autopilot.fence import FenceParams
 from autopilot.interface import ActuatorCommand, Setpoint
 from estimator.interface import HeadingReference
 
@@ -24,6 +25,37 @@ class NeverMissesTheGps(DcmAutopilot):
         params = params_of(aircraft)
         patient = replace(params, failsafe=replace(params.failsafe, gps_lost_s=1e9))
         super().__init__(patient, heading_reference, aircraft)
+
+
+class ClimbsOn(DcmAutopilot):
+    """Waits for a fix to end the climb of a launch."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        params = params_of(aircraft)
+        patient = replace(params, failsafe=replace(params.failsafe, blind_climb=1e9))
+        super().__init__(patient, heading_reference, aircraft)
+
+
+class FliesThroughTheFence(DcmAutopilot):
+    """Is told of a fence, and forgets it."""
+
+    def __init__(
+        self, heading_reference: HeadingReference = "course", aircraft: str = "endurance", fence: object = None
+    ) -> None:
+        assert fence is not None
+        super().__init__(params_of(aircraft), heading_reference, aircraft)
+
+
+class LooksAtTheFenceTooLate(DcmAutopilot):
+    """Turns back once it is outside."""
+
+    def __init__(
+        self,
+        heading_reference: HeadingReference = "course",
+        aircraft: str = "endurance",
+        fence: FenceParams | None = None,
+    ) -> None:
+        super().__init__(params_of(aircraft), heading_reference, aircraft, replace(fence, ahead_s=0.0))
 
 
 class CruisesOn(DcmAutopilot):

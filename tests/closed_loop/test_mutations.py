@@ -27,6 +27,9 @@ TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 BROKEN_AUTOPILOTS = Path(__file__).with_name("broken_autopilots.py")
 TURNS_AT_THE_CORNER = {"autopilot": f"{BROKEN_AUTOPILOTS}:TurnsAtTheCorner"}
 NEVER_MISSES_THE_GPS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverMissesTheGps"}
+CLIMBS_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:ClimbsOn"}
+FLIES_THROUGH_THE_FENCE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FliesThroughTheFence"}
+LOOKS_TOO_LATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:LooksAtTheFenceTooLate"}
 CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
@@ -61,6 +64,8 @@ MUTATIONS = (
     Mutation("crosswind_strong", "premerlani", NO_YAW, "heading error RMS"),
     Mutation("faults", "accelerometer_only", {}, "survived"),
     Mutation("faults", "premerlani", TRUSTS_FORCE, "inclination error, accelerometer stuck"),
+    Mutation("fence", "premerlani", FLIES_THROUGH_THE_FENCE, "greatest distance from the launch point"),
+    Mutation("fence", "premerlani", LOOKS_TOO_LATE, "greatest distance from the launch point"),
     Mutation("gentle_lady_launch", "premerlani", NO_YAW, "heading within 15 deg for good"),
     Mutation("gentle_lady_launch_calm", "premerlani", NO_YAW, "heading within 15 deg for good"),
     Mutation("gentle_lady_launch_cross_wind", "premerlani", NO_YAW, "heading within 15 deg for good"),
@@ -100,6 +105,7 @@ MUTATIONS = (
         {"turn_table": True},
         "heading error of the nose, to be large",
     ),
+    Mutation("launch_no_gps", "premerlani", CLIMBS_ON, "greatest height"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),

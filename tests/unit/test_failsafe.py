@@ -1,11 +1,13 @@
 """The mode in force: each failsafe taken, held and handed back, one tick at a time."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from autopilot.airframes import params_of
 from autopilot.dcm import DcmAutopilot
 from autopilot.energy import EnergyParams
 from autopilot.failsafe import FailsafeParams
@@ -26,20 +28,24 @@ class Aboard:
     """An autopilot and the measurements it is shown, tick after tick."""
 
     def __init__(self, aircraft="endurance"):
-        self.autopilot, self.row = DcmAutopilot(aircraft=aircraft), np.zeros(1, MEASURED_DTYPE)
+        params = params_of(aircraft)
+        still = replace(params.lift, incidence_per_elevator_rad=0.0)  # it does not move: the elevator tells no speed
+        self.autopilot, self.row = DcmAutopilot(replace(params, lift=still)), np.zeros(1, MEASURED_DTYPE)
         self.row["dt_s"], self.row["force_b_m_s2"] = DT_S, (0.0, 0.0, -9.8)
         self.ticks, self.height_m, self.latency_s, self.numbers, self.ground_m_s = 0, 60.0, 0.3, True, 12.0
+        self.dt_s = DT_S
 
     def fly(self, setpoint, seconds, *, gps=True, estimate=None):
         """Commands of so many seconds; a fix every 0.2 s where there is a GPS."""
         commands = []
-        for _ in range(round(seconds / DT_S)):
-            self.row["t_s"] = self.ticks * DT_S
-            self.row["gps_new"] = gps and self.ticks % 10 == 0
+        for _ in range(round(seconds / self.dt_s)):
+            self.row["t_s"], self.row["dt_s"] = self.ticks * self.dt_s, self.dt_s
+            self.row["gps_new"] = gps and self.ticks % round(0.2 / self.dt_s) == 0
             if self.row["gps_new"][0]:
                 self.row["gps_valid"], self.row["gps_t_s"] = 1, self.row["t_s"] - self.latency_s
                 self.row["gps_p_e_m"] = (200.0, 0.0, -self.height_m) if self.numbers else math.nan
                 self.row["gps_v_e_m_s"] = (self.ground_m_s, 0.0, 0.0)
+            self.row["force_b_m_s2"] += 1e-9 * (-1) ** self.ticks  # frozen is what never changes
             measured = Measurements(self.row.copy(), 0)
             commands.append(self.autopilot.update(estimate or AttitudeEstimate(np.eye(3)), measured, setpoint))
             self.ticks += 1
@@ -233,26 +239,30 @@ def test_level_flies_on_the_last_healthy_attitude_and_the_raw_gyros():
     """Against SciPy: 20 degrees of bank when last healthy, 30 deg/s for a second since, the offset taken off.
 
     Roll control is then that of an attitude which the broken estimate does not know: it must be the same as that of
-    an autopilot told the true attitude; equal to 0.5 % of full deflection, for Eqn 17's steps of first order.
+    an autopilot told the true attitude; equal to 0.5 % of full deflection, for Eqn 17's steps of first order.  The
+    accelerometer shows the forces of a slip in that attitude, so that nothing is to be corrected.
     """
     offset, turning = np.radians([3.0, -2.0, 1.0]), np.radians([30.0, 0.0, 0.0])
     aboard, told = Aboard(), Aboard()
-    last = Rotation.from_euler("ZYX", [1.0, 0.05, math.radians(20.0)])
+    last = Rotation.from_euler("ZYX", [0.0, 0.05, math.radians(20.0)])
     healthy = AttitudeEstimate(last.as_matrix(), np.zeros(3), offset)
     aboard.row["gyro_b_rad_s"] = offset
+    aboard.row["force_b_m_s2"] = last.inv().apply([0.0, 0.0, -9.8])
     aboard.fly(asking(Mode.STABILISE), 1.0, estimate=healthy)
     garbage = poor(Rotation.from_euler("ZYX", [2.0, 1.0, -2.5]).as_matrix())
     aboard.fly(asking(Mode.STABILISE), P.unhealthy_s + 0.1, estimate=garbage)
     aboard.row["gyro_b_rad_s"] = offset + turning
-    aboard.fly(asking(Mode.STABILISE), 1.0, estimate=garbage)
-    aboard.autopilot._memory["s"]["roll_integral"] = 0.0
-    aboard.autopilot._memory["s"]["pitch_integral"] = 0.0
-    (level,) = aboard.fly(asking(Mode.STABILISE), DT_S, estimate=garbage)
+    for i in range(51):
+        now = last * Rotation.from_rotvec(turning * DT_S * (i + 1))
+        aboard.row["force_b_m_s2"] = now.inv().apply([0.0, 0.0, -9.8])
+        if i == 50:
+            aboard.autopilot._memory["s"]["roll_integral"] = 0.0
+            aboard.autopilot._memory["s"]["pitch_integral"] = 0.0
+            aboard.autopilot._memory["s"]["climb_integral_rad"] = 0.0
+        (level,) = aboard.fly(asking(Mode.STABILISE), DT_S, estimate=garbage)
     assert level.mode == Mode.LEVEL
-    now = last * Rotation.from_rotvec(turning * 1.02)
     true = AttitudeEstimate(now.as_matrix(), turning)
-    trim = EnergyParams().pitch_trim_rad
-    (expected,) = told.fly(asking(Mode.STABILISE, pitch_rad=trim), DT_S, estimate=true)
+    (expected,) = told.fly(asking(Mode.STABILISE, pitch_rad=level.pitch_demand_rad), DT_S, estimate=true)
     np.testing.assert_allclose(level[:3], expected[:3], rtol=0, atol=0.005)
     assert level.bank_demand_rad == 0.0
 
@@ -405,3 +415,136 @@ def test_radio_lost_on_the_way_home_obeys_neither_throttle_nor_bank_limit():
     alone = aboard.fly(asking(Mode.RETURN, throttle=0.0, bank_limit_rad=0.0, radio=False), 1.0)[-1]
     assert alone.throttle > 0.0
     assert abs(alone.bank_demand_rad) > 0.8 * P.bank_rad
+
+
+def test_estimator_far_from_the_standby_attitude_is_distrusted_at_once():
+    """POOR, and upside down where the gyros saw no roll: not for five seconds, but for half of one."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 5.0)
+    upside_down = poor(np.diag([1.0, -1.0, -1.0]))
+    (_, before_s), (mode, _) = aboard.modes(asking(Mode.COURSE), 2.0, estimate=upside_down)
+    assert mode == Mode.LEVEL
+    np.testing.assert_allclose(before_s, P.apart_s, rtol=0, atol=2 * DT_S)
+
+
+def test_estimator_that_tells_no_numbers_is_distrusted_without_a_gps_too():
+    """Whether there are fixes says nothing about it."""
+    aboard, none = Aboard(), AttitudeEstimate(np.full((3, 3), math.nan))
+    aboard.fly(asking(Mode.COURSE), 5.0, gps=False)
+    assert aboard.fly(asking(Mode.COURSE), P.apart_s + 0.1, gps=False, estimate=none)[-1].mode == Mode.LEVEL
+
+
+def test_level_without_gps_lands():
+    """Level for as long as a circle lasts, then down with wings level; motor on again once the GPS has been back."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 5.0)
+    aboard.fly(asking(Mode.COURSE), 10.0, estimate=poor())
+    silent = aboard.modes(asking(Mode.COURSE), 60.0, gps=False, estimate=poor())
+    assert [m for m, _ in silent] == [Mode.LEVEL, Mode.LAND]
+    np.testing.assert_allclose(silent[0][1], P.gps_lost_s + P.circle_s, rtol=0, atol=0.3)
+    land = aboard.fly(asking(Mode.COURSE), DT_S, gps=False, estimate=poor())[-1]
+    assert land[3:] == (0.0, Mode.LAND, 0.0, P.glide_pitch_rad)
+    back = aboard.modes(asking(Mode.COURSE), 10.0, estimate=poor())
+    assert [m for m, _ in back] == [Mode.LAND, Mode.LEVEL]
+
+
+def test_level_without_radio_lands_later():
+    """A minute for the estimator to recover; the pilot, heard again, has the sticks."""
+    aboard, alone = Aboard(), asking(Mode.STABILISE, radio=False)
+    aboard.fly(asking(Mode.STABILISE), 5.0)
+    aboard.fly(asking(Mode.STABILISE), 10.0, estimate=poor())
+    modes = aboard.modes(alone, 100.0, estimate=poor())
+    assert [m for m, _ in modes] == [Mode.LEVEL, Mode.LAND]
+    np.testing.assert_allclose(modes[0][1], P.level_s, rtol=0, atol=2 * DT_S)
+    assert aboard.fly(asking(Mode.MANUAL), DT_S, estimate=poor())[-1].mode == Mode.MANUAL
+
+
+def test_level_radio_that_flickers_lands_as_well():
+    """A second of radio in ten is nobody who can help."""
+    aboard = Aboard()
+    aboard.fly(asking(Mode.COURSE), 5.0)
+    modes = []
+    for _ in range(9):
+        modes += [c.mode for c in aboard.fly(asking(Mode.COURSE, radio=False), 9.0, estimate=poor())]
+        modes += [c.mode for c in aboard.fly(asking(Mode.COURSE), 1.0, estimate=poor())]
+    assert modes[-100] == Mode.LAND
+
+
+def test_launch_without_any_fix_climbs_for_a_time_circles_and_glides():
+    """One and a half times as long as the climb takes; a first fix ends the circle, and the launch is at its height."""
+    aboard, launch = Aboard(), asking(Mode.LAUNCH, height_m=30.0)
+    aboard.row["force_b_m_s2"] = (27.0, 0.0, -9.8)
+    aboard.fly(launch, 1.0, gps=False)
+    aboard.row["force_b_m_s2"] = (0.0, 0.0, -9.8)
+    modes = aboard.modes(launch, 80.0, gps=False)
+    assert [m for m, _ in modes] == [Mode.LAUNCH, Mode.CIRCLE, Mode.GLIDE]
+    climb_m_s = EnergyParams().airspeed_m_s * math.sin(math.radians(12.0) - EnergyParams().pitch_trim_rad)
+    np.testing.assert_allclose(modes[0][1], P.blind_climb * 30.0 / climb_m_s - 1.0, rtol=0, atol=1.0)
+    np.testing.assert_allclose(modes[1][1], P.circle_s, rtol=0, atol=2 * DT_S)
+    assert aboard.modes(launch, 1.0) == [(Mode.LAUNCH, 1.0)]
+
+
+def test_launch_without_any_fix_ends_its_climb_by_the_barometer():
+    """Where one is fitted, it knows the height."""
+    aboard, launch = Aboard(), asking(Mode.LAUNCH, height_m=30.0)
+    aboard.row["baro_height_m"] = 10.0
+    aboard.row["force_b_m_s2"] = (27.0, 0.0, -9.8)
+    aboard.fly(launch, 1.0, gps=False)
+    aboard.row["force_b_m_s2"] = (0.0, 0.0, -9.8)
+    assert aboard.modes(launch, 4.0, gps=False) == [(Mode.LAUNCH, 4.0)]
+    aboard.row["baro_height_m"] = 26.0
+    assert aboard.fly(launch, 0.1, gps=False)[-1].mode == Mode.CIRCLE
+
+
+BY_HAND, BY_ATTITUDE, BY_PLACE, THROWN = Mode.MANUAL, Mode.STABILISE, Mode.COURSE, Mode.LAUNCH
+GROUPS = dict.fromkeys(BY_POSITION, BY_PLACE) | {Mode.MANUAL: BY_HAND, Mode.RATE: BY_HAND}
+AS_COMMANDED = None
+ENDS = {  # GPS, radio, estimator: where it ends by hand, by attitude, by place, after a launch
+    ("works", "works", "healthy"): (AS_COMMANDED, AS_COMMANDED, AS_COMMANDED, AS_COMMANDED),
+    ("works", "works", "ill"): (AS_COMMANDED, Mode.LEVEL, Mode.LEVEL, Mode.LEVEL),
+    ("works", "works", "never healthy"): (AS_COMMANDED, AS_COMMANDED, AS_COMMANDED, AS_COMMANDED),
+    ("works", "lost", "healthy"): (Mode.GLIDE, Mode.GLIDE, Mode.GLIDE, Mode.GLIDE),
+    ("works", "lost", "ill"): (Mode.LAND, Mode.LAND, Mode.LAND, Mode.LAND),
+    ("works", "lost", "never healthy"): (Mode.GLIDE, Mode.GLIDE, Mode.GLIDE, Mode.GLIDE),
+    ("lost", "works", "healthy"): (AS_COMMANDED, AS_COMMANDED, Mode.GLIDE, Mode.GLIDE),
+    ("lost", "works", "ill"): (AS_COMMANDED, Mode.LAND, Mode.LAND, Mode.LAND),
+    ("lost", "works", "never healthy"): (AS_COMMANDED, AS_COMMANDED, Mode.GLIDE, Mode.GLIDE),
+    ("lost", "lost", "healthy"): (Mode.GLIDE, Mode.GLIDE, Mode.GLIDE, Mode.GLIDE),
+    ("lost", "lost", "ill"): (Mode.LAND, Mode.LAND, Mode.LAND, Mode.LAND),
+    ("lost", "lost", "never healthy"): (Mode.GLIDE, Mode.GLIDE, Mode.GLIDE, Mode.GLIDE),
+    ("never", "works", "healthy"): (AS_COMMANDED, AS_COMMANDED, AS_COMMANDED, Mode.GLIDE),
+    ("never", "works", "ill"): (AS_COMMANDED, Mode.LAND, Mode.LAND, Mode.LAND),
+    ("never", "works", "never healthy"): (AS_COMMANDED, AS_COMMANDED, AS_COMMANDED, Mode.GLIDE),
+    ("never", "lost", "healthy"): (Mode.GLIDE, Mode.GLIDE, Mode.GLIDE, Mode.GLIDE),
+    ("never", "lost", "ill"): (Mode.LAND, Mode.LAND, Mode.LAND, Mode.LAND),
+    ("never", "lost", "never healthy"): (Mode.GLIDE, Mode.GLIDE, Mode.GLIDE, Mode.GLIDE),
+}
+
+
+@pytest.mark.parametrize("conditions", ENDS, ids=" ".join)
+@pytest.mark.parametrize("mode", [*BY_POSITION, *OTHERS, Mode.LAUNCH])
+def test_no_mode_lasts_for_ever_without_somebody_who_can_end_it(mode, conditions):
+    """Every mode with every combination of failures, after 130 s of them: the pilot is in command, or the motor is off.
+
+    A launch is thrown first.  The ill estimator tells no numbers any more, which is noticed without a GPS, too.
+    """
+    gps, radio, estimator = conditions
+    params = replace(Aboard().autopilot.params, failsafe=FailsafeParams(return_s=100.0))
+    aboard = Aboard()
+    aboard.autopilot, aboard.dt_s = DcmAutopilot(params), 0.1
+    well = poor(health=Health.STARTING) if estimator == "never healthy" else None
+    command = asking(mode)
+    aboard.row["force_b_m_s2"] = (27.0, 0.0, -9.8)
+    aboard.fly(command, 1.0, gps=gps != "never", estimate=well)
+    aboard.row["force_b_m_s2"] = (0.0, 0.0, -9.8)
+    aboard.fly(command, 9.0, gps=gps != "never", estimate=well)
+    ill = AttitudeEstimate(np.full((3, 3), math.nan)) if estimator == "ill" else well
+    after = replace(command, radio=radio == "works")
+    last = aboard.fly(after, 130.0, gps=gps == "works", estimate=ill)[-1]
+    column = (BY_HAND, BY_ATTITUDE, BY_PLACE, THROWN).index(GROUPS.get(mode, mode))
+    expected = ENDS[conditions][column]
+    assert last.mode == (mode if expected is AS_COMMANDED else expected)
+    if last.mode in (Mode.GLIDE, Mode.LAND):
+        assert last.throttle == 0.0
+    else:
+        assert after.radio

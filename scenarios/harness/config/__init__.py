@@ -1,6 +1,7 @@
 """The configuration of a flight: what flies, in which air, with which faults."""
 
 from scenarios.harness.config.air import AirConfig, GustConfig, Wind, build_air, parse_wind
+from scenarios.harness.config.fence import FenceConfig
 from scenarios.harness.config.flight import (
     FlightConfig,
     RatesConfig,
@@ -16,6 +17,7 @@ from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStar
 __all__ = [
     "AirConfig",
     "BenchStart",
+    "FenceConfig",
     "FlightConfig",
     "GustConfig",
     "HandMotion",

@@ -16,6 +16,7 @@ from scenarios.harness.config.air import AirConfig as AirConfig  # scenarios fin
 from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.battery import BatteryConfig
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
+from scenarios.harness.config.fence import FenceConfig, within_box
 from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
 from scenarios.harness.config.tolerances import AirframeConfig, TolerancesConfig, resolve_airframe
 from scenarios.harness.config.validation import validated
@@ -82,6 +83,7 @@ class FlightConfig(_Model):
     airframe, tolerances : differences of the aeroplane from its drawing, and the deviations they are drawn from
     manoeuvre : the scenario's own parameters
     faults : of sensors, surfaces and motor, each as text, ``gyro.x:stuck@20-25``, see `config.faults.parse_fault`
+    fence : the geofence, see `config.fence`
     box_radius_m, box_height_m : of the cylinder around the launch point; the flight ends when it is left
     seed, flight : campaign, and number of the flight in it: they name the random streams
     """
@@ -105,6 +107,7 @@ class FlightConfig(_Model):
     tolerances: TolerancesConfig = Field(default_factory=TolerancesConfig)
     start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
     manoeuvre: dict[str, float] = Field(default_factory=dict)
+    fence: FenceConfig = Field(default_factory=FenceConfig)
     box_radius_m: float = Field(default=3000.0, gt=0.0, le=20000.0)
     box_height_m: float = Field(default=1000.0, gt=0.0, le=5000.0)
     seed: int = Field(default=0, ge=0, le=LARGEST_SEED)
@@ -131,6 +134,11 @@ class FlightConfig(_Model):
             raise ValueError(
                 "air: the flight is on a table indoors, in still air; leave out wind, gusts, turbulence and thermals"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _fence_within_box(self) -> "FlightConfig":
+        within_box(self.fence, self.box_radius_m, self.box_height_m)
         return self
 
     @model_validator(mode="after")
@@ -222,7 +230,7 @@ def fitted_suite(config: FlightConfig) -> SuiteParams:
     return suite_params(config.suite, config.sensors, config.files)
 
 
-_TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts")
+_TEXTS = ("aircraft", "estimator", "autopilot", "suite", "withheld", "faults", "air.gusts", "fence.action")
 
 
 def is_field(name: str, config: FlightConfig, overrides: Mapping[str, Any]) -> bool:
