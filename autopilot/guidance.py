@@ -124,7 +124,7 @@ def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, blown, p):  # type: i
     the GPS velocity less the wind, rotated by the unseen turn: the nose turns as the gyros say.
 
     R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured   blown : in strong wind
-    s : record with `airspeed_m_s`, `unseen_turn_rad`, `wind_seen_e_m_s`
+    s : record with `airspeed_m_s`, `true_factor`, `unseen_turn_rad`, `wind_seen_e_m_s`
     """
     north, east = unit(R_eb[0, 0], R_eb[1, 0])
     known, v = is_wind(wind_e_m_s, 2), row.gps_v_e_m_s
@@ -132,11 +132,11 @@ def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, blown, p):  # type: i
         w0, w1 = (wind_e_m_s[0], wind_e_m_s[1]) if known else (s.wind_seen_e_m_s[0], s.wind_seen_e_m_s[1])
         x, y = turned_now(v[0] - w0, v[1] - w1, s)
         north, east = unit(x, y)
-        return over_ground(north, east, w0, w1, s.airspeed_m_s, p)
+        return over_ground(north, east, w0, w1, s.true_factor * s.airspeed_m_s, p)
     if not on_nose:
         return north, east
     if known:
-        return over_ground(north, east, wind_e_m_s[0], wind_e_m_s[1], s.airspeed_m_s, p)
+        return over_ground(north, east, wind_e_m_s[0], wind_e_m_s[1], s.true_factor * s.airspeed_m_s, p)
     if math.isfinite(gps_age(row, p)) and math.hypot(v[0], v[1]) > 3.0:
         x, y = turned_now(v[0], v[1], s)
         return unit(x, y)

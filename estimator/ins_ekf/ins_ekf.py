@@ -54,6 +54,7 @@ import math
 
 import numpy as np
 
+from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.magnetometer import FIELD, take_field
 from estimator.blocks.screening import COAST_S, FORCE_GOOD, GPS, GYRO_GOOD, airspeed_came, refuse, screen
@@ -142,7 +143,7 @@ _AROUND = (
     Column("w_fix_early_s", (SIZE,), "time from that to its end"),
     Column("w_fix_latency_s", (SIZE,), "latency with which it was placed"),
     Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
-    Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
+    Column("w_airspeed_m_s", (SIZE,), "true airspeed measured in it"),
 )
 STATE_DTYPE = state_dtype(InsEkfParams, *FIELD, *_FILTER, *_AROUND)
 
@@ -218,7 +219,7 @@ def attach_others(row, s):  # type: ignore[no-untyped-def]
     if s.use_airspeed and airspeed_came(row, s):
         s.air_age_s = 0.0
         s.w_bits[i] |= HAS_AIR
-        s.w_airspeed_m_s[i] = max(row.equivalent_airspeed_m_s, 0.0)
+        s.w_airspeed_m_s[i] = true_airspeed_factor(row, s.elevation_m) * max(row.equivalent_airspeed_m_s, 0.0)
 
 
 # The present

@@ -86,10 +86,11 @@ class Prepared:
         faults = [parse_fault(fault) for fault in config.faults]
         plant = build_plant(config, rates, faults)
         airborne = isinstance(config.start, InFlightStart)
-        on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight) if airborne else None
+        place = config.place.build()
+        on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight, place) if airborne else None
         flown = fly(
             plant,
-            Suite(self.suite, rates, config.seed, config.flight, of_family("sensor", faults), plant.release_s),
+            Suite(self.suite, rates, config.seed, config.flight, of_family("sensor", faults), plant.release_s, place),
             self.estimator.code,
             self.autopilot.code,
             self.script,

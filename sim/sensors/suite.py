@@ -15,6 +15,7 @@ from estimator.interface import MEASURED_DTYPE, Measurements
 from sim.clock import Rates
 from sim.faults import Fault
 from sim.log import TRUTH_DTYPE, Log
+from sim.place import LAUNCH_PLACE, Place
 from sim.rng import stream
 from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
 from sim.sensors.accelerometer import measure_force
@@ -54,14 +55,14 @@ class Snapshot(NamedTuple):
 
 
 class Suite:
-    """The sensors of flight number `flight` of the campaign `seed`, with `faults`.
+    """The sensors of flight number `flight` of the campaign `seed`, with `faults`, at a launch `place`.
 
     Fault times count from the release, `release_s` after power-up.  Errors are drawn in `reset`.
     """
 
     def __init__(
         self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: Sequence[Fault] = (),
-        release_s: float = 0.0,
+        release_s: float = 0.0, place: Place = LAUNCH_PLACE,
     ) -> None:  # fmt: skip
         for fault in faults:
             require_possible(fault, params, rates.gps_hz)
@@ -70,7 +71,7 @@ class Suite:
             if part is not None:
                 rates.steps_per_sample(what, part.rate_hz)  # rejected here, before the flight
         self.params = params
-        self.rates = rates
+        self.rates, self.place = rates, place
         self._source = partial(stream, seed, flight)
         self._truth = np.zeros(0, TRUTH_DTYPE)
         self._measured = self._seen = self._shown = np.zeros(0, MEASURED_DTYPE)
@@ -95,13 +96,13 @@ class Suite:
         gyro.draw(p.gyro, p.board, rates, source, noise)
         accelerometer.make(p.accelerometer, p.board, rates, source, unit["accelerometer"])
         accelerometer.draw(p.accelerometer, p.board, rates, source, noise)
-        gps.make(p.gps, rates, source, unit["gps"])
+        gps.make(p.gps, rates, source, unit["gps"], self.place)
         gps.draw(p.gps, rates, source, noise)
         if p.magnetometer is not None:
-            magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"])
+            magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"], self.place)
             magnetometer.draw(p.magnetometer, rates, source, noise)
         if p.airspeed is not None or p.barometer is not None:
-            air_data.make(p.airspeed, p.barometer, rates, source, unit["air"])
+            air_data.make(p.airspeed, p.barometer, rates, source, unit["air"], self.place)
             air_data.draw(p.airspeed, p.barometer, rates, source, noise)
         self._unit, self._noise, self._memory = unit, noise, np.zeros(1, MEMORY)
         self._faults = fault_table(self.faults, self._release_s, rates, source, unit, len(log))

@@ -17,6 +17,7 @@ from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.battery import BatteryConfig
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
 from scenarios.harness.config.fence import FenceConfig, within_box
+from scenarios.harness.config.place import PlaceConfig
 from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
 from scenarios.harness.config.tolerances import AirframeConfig, TolerancesConfig, resolve_airframe
 from scenarios.harness.config.validation import validated
@@ -103,6 +104,7 @@ class FlightConfig(_Model):
     faults: tuple[str, ...] = ()
     battery: BatteryConfig = Field(default_factory=BatteryConfig)
     air: AirConfig = Field(default_factory=AirConfig)
+    place: PlaceConfig = Field(default_factory=PlaceConfig)
     airframe: AirframeConfig = Field(default_factory=AirframeConfig)
     tolerances: TolerancesConfig = Field(default_factory=TolerancesConfig)
     start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
