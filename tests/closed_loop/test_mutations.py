@@ -30,6 +30,7 @@ NEVER_MISSES_THE_GPS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverMissesTheGps"}
 CLIMBS_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:ClimbsOn"}
 FLIES_THROUGH_THE_FENCE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FliesThroughTheFence"}
 LOOKS_TOO_LATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:LooksAtTheFenceTooLate"}
+FOLLOWS_THE_COURSE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FollowsTheCourse"}
 CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
@@ -107,6 +108,8 @@ MUTATIONS = (
         "heading error of the nose, to be large",
     ),
     Mutation("launch_no_gps", "premerlani", CLIMBS_ON, "greatest height"),
+    Mutation("loiter_wind", "premerlani", FOLLOWS_THE_COURSE, "greatest distance from the centre"),
+    Mutation("loiter_wind_nose", "gps_velocity_nose", CRUISES_ON, "heading error RMS"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("maiden_flight", "premerlani", NEVER_TRIMS, "off the course RMS"),

@@ -200,3 +200,24 @@ def test_bank_to_return_any_wind_passes_the_launch_point_again_and_again(from_de
     passes = np.flatnonzero(near[1:] & ~near[:-1])
     assert len(passes) >= 3
     assert passes[0] * 0.02 < 60.0
+
+
+@pytest.mark.parametrize("nose_deg", range(0, 360, 30))
+@pytest.mark.parametrize("known", [False, True])
+def test_direction_of_travel_in_strong_wind_follows_the_nose_and_not_the_course(nose_deg, known):
+    """11 m/s to the east, the estimator's course the wrong way round: the triangle of nose and limited wind."""
+    s, air = state(), CRUISE_M_S * np.exp(1j * math.radians(nose_deg))
+    s["wind_seen_e_m_s"] = (0.0, 0.0) if known else (0.0, 11.0)
+    s["unseen_turn_rad"] = 0.5  # turned on since the fix
+    wind = np.array([0.0, 11.0, 0.0]) if known else UNKNOWN
+    row = row_of(v_e_m_s=(air.real, air.imag + 11.0, 0.0))
+    north, east = direction_of_travel(nose(math.radians(nose_deg + 180.0)), wind, row, s, 0, 1, record())
+    expected = air * np.exp(0.5j) + PARAMS.wind_share * CRUISE_M_S * 1j
+    np.testing.assert_allclose(complex(north, east), expected / abs(expected), rtol=0, atol=1e-9)
+
+
+def test_direction_of_travel_in_strong_wind_without_gps_is_the_estimate():
+    s = state()
+    s["wind_seen_e_m_s"] = 0.0, 11.0
+    north, east = direction_of_travel(nose(1.0), UNKNOWN, row_of(valid=0), s, 0, 1, record())
+    assert (north, east) == pytest.approx((math.cos(1.0), math.sin(1.0)))
