@@ -70,7 +70,7 @@ from estimator.blocks.gps_lag import (
 )
 from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
-from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen
+from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen, watch_limit
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
@@ -247,6 +247,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         corrected_rate(row, s, good)
         if s.learning:  # of the previous sample: the processor need not wait for it, and it changes slowly
             learn_offset(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_i_b)
+        watch_limit(s.omega_i_b, s.offset_limit_rad_s, s)
         if not integrate(s.R_eb, s.omega_total_b, s.dt_s):  # Eqns 17-21
             s.locked = 0
         filter_nose(s)

@@ -28,7 +28,7 @@ from scenarios.harness.config.tolerances import AirframeConfig, TolerancesConfig
 from scenarios.harness.metrics import Series, at, height_m, inclination_error_deg
 from scenarios.harness.scenario import Scenario
 from scenarios.harness.scripts import ahead
-from sim.loop import Flight
+from sim.log import Flight
 
 SETTLED = at(45.0)
 BUILT = AirframeConfig(mass_factor=1.1, cg_aft=0.04, aileron_trim=0.2, elevator_trim=-0.1)

@@ -10,7 +10,7 @@ EAS is 0.953 of the true airspeed V at 1,000 m, 0.866 at 2,900 m.
 
 Height from the pressure of the standard atmosphere (ISO 2533, troposphere), after a first-order lag:
 
-    p = p0 (1 - L h / T0)^(g0 / R L) + drift + wander + noise
+    p = p0 (1 - L h / T0)^(g0 / R L) + drift D (1 - exp(-t / D)) + wander + noise
 
 The pressure at the launch point is standard and known to the firmware.
 
@@ -32,6 +32,7 @@ from sim.sensors.noise import (
     Source,
     gauss_markov,
     lag_weights,
+    levelling_off,
     require,
     require_scale,
     to_step,
@@ -76,7 +77,9 @@ class BarometerParams:
     rate_hz : sample rate, which must divide the physics rate (Hz, default 10).  Higher: fresher height
     lag_s : time constant of the lag of the height (s, default 0)
     noise_pa : sigma of each sample (Pa, default 0)
-    drift_pa_min : sigma of the steady drift with weather and temperature (Pa per minute, default 0)
+    drift_pa_min : sigma of the drift with weather and temperature at power-up (Pa per minute, default 0)
+    drift_s : time constant with which that levels off (s, default 36000, an assumption: 1 Pa per minute, or 1.8 hPa in
+        three hours, then ends at 6 hPa, as the weather of a season scatters).  Higher: it goes on for longer
     wander_pa : sigma of the correlated error (Pa, default 0)
     wander_s : correlation time of that error (s, default 30).  Higher: averages out more slowly
     range_pa : full scale, from 0 (Pa, default inf: none).  Below the pressure on the ground: saturates there
@@ -87,6 +90,7 @@ class BarometerParams:
     lag_s: float = 0.0
     noise_pa: float = 0.0
     drift_pa_min: float = 0.0
+    drift_s: float = 36000.0
     wander_pa: float = 0.0
     wander_s: float = 30.0
     range_pa: float = math.inf
@@ -95,7 +99,7 @@ class BarometerParams:
     def __post_init__(self) -> None:
         require(self, "rate_hz", least=0.1)
         require(self, "lag_s", "noise_pa", "wander_pa", "drift_pa_min")
-        require(self, "wander_s", least=0.001)
+        require(self, "wander_s", "drift_s", least=0.001)
         require_scale(self, "range_pa", "step_pa")
 
 
@@ -157,7 +161,7 @@ def draw(
         error_pa += barometer.noise_pa * source("barometer noise").standard_normal(n)
     if barometer.drift_pa_min > 0.0:
         rate_pa_s = barometer.drift_pa_min / 60.0 * source("barometer drift").standard_normal()
-        error_pa += rate_pa_s * rates.dt_s * np.arange(1, n + 1)
+        error_pa += rate_pa_s * levelling_off(rates.dt_s * np.arange(1.0, n + 1.0), barometer.drift_s)
     if barometer.wander_pa > 0.0:
         steps = source("barometer wander").standard_normal((n, 1))
         error_pa += gauss_markov(steps, np.array([barometer.wander_pa]), barometer.wander_s, rates.dt_s)[:, 0]

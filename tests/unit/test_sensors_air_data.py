@@ -266,6 +266,20 @@ def test_barometer_drifts_steadily_with_the_sigma_of_its_rate():
     assert_sigma(drawn, 1.0)
 
 
+def test_barometer_drift_levels_off():
+    """After one time constant 1 - 1 / e of it, after many all of it; the same slope at power-up whatever that is."""
+
+    def drawn(drift_s):
+        suite = Suite(SuiteParams(barometer=BarometerParams(drift_pa_min=6.0, drift_s=drift_s)), Rates(), 5)
+        suite.reset(Log.empty(3000))
+        return suite.snapshot().noise["baro_error_pa"]
+
+    short, long = drawn(5.0), drawn(36000.0)
+    np.testing.assert_allclose(short[249] / long[249], 1.0 - math.exp(-1.0), rtol=1e-3, atol=0)
+    np.testing.assert_allclose(short[-1] * 12.0 / long[-1], 1.0, rtol=2e-3, atol=0)  # 60 s are 12 of 5 s
+    np.testing.assert_allclose(short[0] / long[0], 1.0, rtol=3e-3, atol=0)
+
+
 def test_barometer_wanders_with_its_sigma_and_time_constant():
     """Over flights 12 Pa make 1 m at any time; after its time constant 1 / e of it is left."""
     first, later = [], []
