@@ -51,20 +51,20 @@ STRAIGHT = Scenario(
 
 
 def flown(estimator, wind_from, turn_deg=0.0, seed=0, **changes):
-    """Flight; mean true airspeed over the last half minute, and the largest error of a wind that was reported."""
+    """Flight; mean true airspeed over the last half minute, and the RMS error of the wind while one was reported."""
     overrides = {"air.wind_from_deg": wind_from, "manoeuvre.turn_deg": turn_deg, **changes}
     flight = fly_scenario(STRAIGHT, overrides, seed=seed, estimator=estimator)
     log = flight.log
     late = log.truth["t_s"] > 50.0
     error = np.hypot(*(log.flown["wind_e_m_s"] - log.truth["wind_e_m_s"].mean(axis=0))[:, :2].T)
     known = np.isfinite(error)
-    return flight, float(log.truth["airspeed_m_s"][late].mean()), float(error[known].max()) if known.any() else 0.0
+    return flight, float(log.truth["airspeed_m_s"][late].mean()), float(np.sqrt(np.mean(error[known] ** 2))) if known.any() else 0.0
 
 
 @pytest.mark.parametrize("estimator", WITH_WIND)
 @pytest.mark.parametrize(("wind_from", "turn_deg"), [("head", 0.0), ("tail", 0.0), ("head", 180.0)])
 def test_wind_that_is_not_learnt_is_not_reported_and_the_speed_is_held(estimator, wind_from, turn_deg):
-    """6 m/s ahead or behind, never turned or once: cruise within 1.5 m/s, and no wind that is off by 2 m/s.
+    """6 m/s ahead or behind, never turned or once: cruise within 1.5 m/s, and no wind, or one within 1.5 m/s.
 
     With the gyro offset of seed 0, pitch by MatrixPilot is 18 degrees low for a while, and without airspeed so is the
     nose: that is no matter of the wind.
@@ -72,7 +72,7 @@ def test_wind_that_is_not_learnt_is_not_reported_and_the_speed_is_held(estimator
     flight, airspeed_m_s, wind_error_m_s = flown(estimator, wind_from, turn_deg, seed=1)
     assert flight.outcome == Outcome.COMPLETED
     assert abs(airspeed_m_s - CRUISE_M_S) < 1.5
-    assert wind_error_m_s < 2.0
+    assert wind_error_m_s < 1.5
 
 
 @pytest.mark.parametrize("wind_from", ["head", "tail"])
