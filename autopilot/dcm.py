@@ -19,6 +19,7 @@ from autopilot.energy import (
 )
 from autopilot.failsafe import circle, end_blind_climb, examine, listen, mode_in_force
 from autopilot.fence import FenceParams, ceiling
+from autopilot.fixes import take_in
 from autopilot.guidance import (
     agility,
     bank_for_heading,
@@ -27,6 +28,7 @@ from autopilot.guidance import (
     gps_age,
     heading_error,
     height,
+    turn_rate,
     unseen_turn,
     way_wanted,
 )
@@ -48,14 +50,15 @@ from autopilot.interface import (
     ActuatorCommand,
     Setpoint,
 )
-from autopilot.launch import climb_away, feel_throw
+from autopilot.launch import climb_away, feel_throw, reckon_throw, steepest_rate
 from autopilot.lift import feel_lift
 from autopilot.mixer import mix
 from autopilot.route import bank_along_route, bank_to_circle
 from autopilot.stabilise import rate_control, rate_demand
+from estimator.blocks.gps_integrity import WATCH
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
-from estimator.interface import AttitudeEstimate, HeadingReference, Measurements
+from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, HeadingReference, Measurements
 
 
 def _floats(params: type[Any]) -> np.dtype[Any]:
@@ -98,7 +101,11 @@ _STATE = np.dtype(
         ("unseen_turn_rad", "f8"),  # turn not yet visible in the GPS course
         ("outbound", "i8"),  # flying away from the launch point after passing it
         ("felt_m_s2", "f8"),  # mean acceleration along the nose
-        ("thrown_s", "f8"),  # since the throw, -1 before it
+        ("gained_m_s", "f8"),  # speed along the nose gained by pushing, slowly forgotten
+        ("ahead_m_s", "f8"),  # velocity along the nose and below it, from the throw
+        ("below_m_s", "f8"),
+        ("peak_m_s2", "f8"),  # largest mean acceleration of the push
+        ("thrown_s", "f8"),  # since the end of the throw, 0 during its push, -1 before it
         ("levelled_off", "i8"),  # the climb after the throw has ended
         ("next_waypoint", "i8"),  # of the route
         ("on_leg", "i8"),  # flying towards it, from
@@ -127,11 +134,15 @@ _STATE = np.dtype(
         ("force_last_b_m_s2", "f8", (3,)),  # last specific force
         ("force_frozen_s", "f8"),  # time for which it has not changed
         ("height_kept_m", "f8"),  # at the start of LEVEL
+        ("fix_held_back", "i8"),  # the last fix cannot be true
+        *((c.name, "i8" if c.integer else "f8", c.shape) for c in WATCH),
     ],
     align=True,
 )
 # One array with everything the kernel needs besides the inputs of a tick: each array argument costs time per call.
-_MEMORY = np.dtype([("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8")], align=True)
+_MEMORY = np.dtype(
+    [("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8"), ("seen", MEASURED_DTYPE)], align=True
+)
 
 _WIND_UNKNOWN = np.full(3, np.nan)
 _DT_LIMIT_S = 0.1  # longer sample intervals are gaps and are not integrated in full
@@ -142,6 +153,7 @@ def ask(mode, s):  # type: ignore[no-untyped-def]
     """Handle a new mode of the setpoint: each launch waits for a new throw."""
     if mode == LAUNCH:
         s.roll_integral = s.pitch_integral = s.felt_m_s2 = s.climb_integral_rad = s.throttle_integral = 0.0
+        s.gained_m_s = 0.0
         s.thrown_s = -1.0
         s.levelled_off = 0
     s.setpoint_mode = mode
@@ -241,10 +253,16 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
         throttle = me.p.energy.throttle_trim
     else:
         bank, pitch, throttle = guide(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
-        throttle = throttle_to_recover(R_eb[2, 0], pitch, throttle)
+        gathers_speed = s.mode == LAUNCH and s.thrown_s < me.p.launch.full_throttle_s
+        if gathers_speed:
+            reckon_throw(R_eb, omega_b_rad_s, row, s, me.p, dt_s)
+        else:
+            throttle = throttle_to_recover(R_eb[2, 0], pitch, throttle)
         up = -1.0 if s.inverted else 1.0
         demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, up, s.true_factor * s.airspeed_m_s, me.p.stabilise)
-    in_hand = s.mode == LAUNCH and s.thrown_s < 0.0
+        if gathers_speed:
+            demand = (demand[0], min(demand[1], steepest_rate(R_eb, row, s, me.p.launch)), demand[2])
+    in_hand = s.mode == LAUNCH and s.thrown_s < me.p.launch.motor_delay_s
     still_s = 0.0 if in_hand else dt_s
     moved = rate_control(demand, R_eb, omega_b_rad_s, s.airspeed_m_s, s.true_factor, s, me.p.stabilise, still_s)
     if math.isfinite(setpoint.throttle) and s.mode == setpoint.mode and setpoint.radio and not in_hand:
@@ -287,7 +305,9 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     rows, k : measured log and its row   memory : shape (1,), parameters, setpoint and state
     """
     me = memory[0]
-    setpoint, s, p, row = me.setpoint, me.s, me.p, rows[k]
+    setpoint, s, p, row = me.setpoint, me.s, me.p, me.seen
+    turning = turn_rate(R_eb, omega_b_rad_s) if s.believed else turn_rate(s.R_kept_eb, s.omega_kept_b_rad_s)
+    take_in(rows[k], turning, row, s)
     known = math.isfinite(row.dt_s)
     dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S) if known else 0.0
     for i in range(3):
@@ -365,6 +385,7 @@ class DcmAutopilot:
         for group in _GROUPS:
             me["p"][group] = astuple(getattr(self.params, group))
         me["s"]["mode"] = me["s"]["setpoint_mode"] = me["s"]["led_by"] = me["s"]["thrown_s"] = -1
+        me["s"]["placed"] = 1  # unlike an estimator, it needs a position
         me["s"]["believed"], me["s"]["heard_s"], me["s"]["R_kept_eb"] = 1, math.inf, np.eye(3)
         me["s"]["true_factor"] = 1.0
         me["on_nose"] = self.heading_reference == "nose"

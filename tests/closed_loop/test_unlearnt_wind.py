@@ -58,7 +58,8 @@ def flown(estimator, wind_from, turn_deg=0.0, seed=0, **changes):
     late = log.truth["t_s"] > 50.0
     error = np.hypot(*(log.flown["wind_e_m_s"] - log.truth["wind_e_m_s"].mean(axis=0))[:, :2].T)
     known = np.isfinite(error)
-    return flight, float(log.truth["airspeed_m_s"][late].mean()), float(np.sqrt(np.mean(error[known] ** 2))) if known.any() else 0.0
+    rms_m_s = float(np.sqrt(np.mean(error[known] ** 2))) if known.any() else 0.0
+    return flight, float(log.truth["airspeed_m_s"][late].mean()), rms_m_s
 
 
 @pytest.mark.parametrize("estimator", WITH_WIND)
