@@ -22,6 +22,7 @@ WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
 UNAWARE = {"withheld": "gps_latency_s"}
+NOT_TOLD_THE_ELEVATION = {"withheld": "elevation_m"}
 UNTURNED = {"turn_table": False}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 BROKEN_AUTOPILOTS = Path(__file__).with_name("broken_autopilots.py")
@@ -136,6 +137,7 @@ MUTATIONS = (
     Mutation("turns_180_bank_45", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
     Mutation("turns_180_bank_60", "premerlani", TRUSTS_FORCE, "inclination error RMS while banked"),
     Mutation("turns_180_bank_60", "premerlani", {"manoeuvre.bank_deg": 45.0}, "banked by 54 deg or more"),
+    Mutation("turns_180_high", "premerlani", NOT_TOLD_THE_ELEVATION, "inclination error RMS while banked"),
     Mutation("vertical", "premerlani", NO_YAW, "heading error RMS afterwards"),
     Mutation("vertical", "premerlani", TRUSTS_FORCE, "inclination error RMS while going up and over"),
     Mutation("vertical", "premerlani", RUDDER_STUCK, "swung round to the left"),
