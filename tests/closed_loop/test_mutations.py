@@ -31,6 +31,7 @@ NEVER_MISSES_THE_GPS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverMissesTheGps"}
 CLIMBS_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:ClimbsOn"}
 FLIES_THROUGH_THE_FENCE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FliesThroughTheFence"}
 LOOKS_TOO_LATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:LooksAtTheFenceTooLate"}
+BELIEVES_EVERY_FIX = {"autopilot": f"{BROKEN_AUTOPILOTS}:BelievesEveryFix"}
 CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
@@ -109,6 +110,8 @@ MUTATIONS = (
         "heading error of the nose, to be large",
     ),
     Mutation("launch_no_gps", "premerlani", CLIMBS_ON, "greatest height"),
+    Mutation("loiter_gps_stuck", "gyro_only", {}, "survived"),
+    Mutation("loiter_gps_stuck", "premerlani", BELIEVES_EVERY_FIX, "circled"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("motor_dead", "premerlani", IGNORES_THE_ELEVATOR, "angle of attack"),
