@@ -45,7 +45,7 @@ _GLIDE_PITCH_RAD = math.radians(-5.0)
 _GENTLE_LADY = AutopilotParams(
     stabilise=StabiliseParams(
         airspeed_m_s=_GLIDE_M_S,
-        # Rudder causes sideslip, which causes roll, with the Dutch roll (period 1.6 s) in between: bank is slow.
+        # Rudder causes sideslip, which causes roll, with the Dutch roll (period 1.7 s) in between: bank is slow.
         roll_gain_1_s=1.8,
         roll_rate_limit_rad_s=0.5,
         roll_control_per_rate_s=1.2,

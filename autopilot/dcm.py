@@ -81,7 +81,8 @@ _STATE = np.dtype(
         ("climb_integral_rad", "f8"),  # pitch of the integrated climb error
         ("throttle_integral", "f8"),  # throttle of the integrated energy error
         ("inverted", "i8"),  # flying inverted
-        ("airspeed_m_s", "f8"),  # best knowledge
+        ("airspeed_m_s", "f8"),  # best knowledge, equivalent
+        ("true_factor", "f8"),  # true over equivalent airspeed
         ("airspeed_known", "i8"),  # measured, or from GPS and wind
         ("lift_m_s", "f8"),  # airspeed from the elevator, 0 if unknown
         ("elevator", "f8"),  # last command
@@ -181,7 +182,7 @@ def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-
         limit_rad = min(limit_rad, failsafe.low_bank_rad)
     limit_rad = min(limit_rad, max(steepest_bank(s, me.p.energy), failsafe.low_bank_rad))
     if not me.on_nose:
-        limit_rad *= agility(s, me.p.energy.airspeed_m_s, p)
+        limit_rad *= agility(s, s.true_factor * me.p.energy.airspeed_m_s, p)
     r_zy = -R_eb[2, 1] if s.inverted else R_eb[2, 1]
     if s.led_by == RETURN:
         bank = bank_to_return(north, east, r_zy, row, s, limit_rad, p)
@@ -236,10 +237,10 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
         bank, pitch, throttle = guide(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
         throttle = throttle_to_recover(R_eb[2, 0], pitch, throttle)
         up = -1.0 if s.inverted else 1.0
-        demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, up, s.airspeed_m_s, me.p.stabilise)
+        demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, up, s.true_factor * s.airspeed_m_s, me.p.stabilise)
     in_hand = s.mode == LAUNCH and s.thrown_s < 0.0
     still_s = 0.0 if in_hand else dt_s
-    moved = rate_control(demand, R_eb, omega_b_rad_s, s.airspeed_m_s, s, me.p.stabilise, still_s)
+    moved = rate_control(demand, R_eb, omega_b_rad_s, s.airspeed_m_s, s.true_factor, s, me.p.stabilise, still_s)
     if math.isfinite(setpoint.throttle) and s.mode == setpoint.mode and setpoint.radio and not in_hand:
         throttle = setpoint.throttle
     aileron, elevator, rudder, throttle = mix(moved[0], moved[1], moved[2], throttle, me.p.mixer)
@@ -358,6 +359,7 @@ class DcmAutopilot:
             me["p"][group] = astuple(getattr(self.params, group))
         me["s"]["mode"] = me["s"]["setpoint_mode"] = me["s"]["led_by"] = me["s"]["thrown_s"] = -1
         me["s"]["believed"], me["s"]["heard_s"], me["s"]["R_kept_eb"] = 1, math.inf, np.eye(3)
+        me["s"]["true_factor"] = 1.0
         me["on_nose"] = self.heading_reference == "nose"
         self._setpoint: Setpoint | None = None
 

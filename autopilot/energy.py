@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 from autopilot.guidance import gps_age, height, is_wind, unit
 from autopilot.stabilise import far_off
+from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.kernels import clip
 from estimator.blocks.screening import AIRSPEED_RANGE_M_S
 from estimator.compiler.jit import kernel
@@ -36,7 +37,8 @@ from estimator.interface import G_M_S2
 class EnergyParams:
     """Speeds, trim and gains; the defaults are for the aeroplane `endurance`.
 
-    airspeed_m_s : cruise speed (m/s, default 12.6).  Higher: faster, more throttle
+    airspeed_m_s : cruise speed, an equivalent airspeed as all speeds here (m/s, default 12.6).  Higher: faster, more
+        throttle
     stall_m_s : stall speed (m/s, default 6.95).  Higher: the nose goes down earlier
     best_glide_m_s : speed of best glide (m/s, default 8.6).  Higher: flies faster against headwind
     fastest_m_s : maximum speed (m/s, default 18).  Lower: may not make headway against strong wind
@@ -66,6 +68,8 @@ class EnergyParams:
     throttle_per_height_1_m : integral gain of the energy error (1/m, default 0.01).  Higher: learns trim faster
     throttle_integral_limit : limit of that integral (default 0.2).  Lower: large trim errors remain
     throttle_least : minimum throttle (default 0.1), for airflow over the tail.  Higher: descends more slowly
+    elevation_m : elevation of the launch place above the sea (m, default 0).  Higher: expects faster motion at the same
+        airspeed, and more throttle
     """
 
     airspeed_m_s: float = 12.6
@@ -98,6 +102,7 @@ class EnergyParams:
     throttle_per_height_1_m: float = 0.01
     throttle_integral_limit: float = 0.2
     throttle_least: float = 0.1
+    elevation_m: float = 0.0
 
 
 SLOWEST, FASTEST = 0.6, 1.6  # range of a plausible airspeed over cruise
@@ -107,16 +112,17 @@ TURN_MARGIN = 1.1
 
 @kernel
 def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Update the airspeed, m/s, and whether it is known, in `s`; call once per tick.
+    """Update the equivalent airspeed, m/s, the true airspeed over it, and whether it is known; call once per tick.
 
     Measured, if a pitot tube is fitted; else from GPS velocity minus estimated wind, corrected for the receiver's
     filter (time constant T), which shortens a vector turning at w by sqrt(1 + (w T)^2); else the trim speed.  Ground
     speed alone is no measure of airspeed: it is wrong by the wind, and changes by twice that between opposite legs.
 
     wind_e_m_s : shape (3,) or NaN   row : measured   p : record of AutopilotParams
-    s : record with `airspeed_m_s`, `airspeed_known`, `air_left_s`, updated
+    s : record with `airspeed_m_s`, `true_factor`, `airspeed_known`, `air_left_s`, updated
     """
     e = p.energy
+    s.true_factor = true_airspeed_factor(row, e.elevation_m)
     measured = abs(row.equivalent_airspeed_m_s) < AIRSPEED_RANGE_M_S  # False for NaN
     s.air_left_s = e.speed_trust_s if row.air_new and measured else s.air_left_s - dt_s
     if s.air_left_s > 0.0 and measured:
@@ -128,7 +134,7 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
             v, w = row.gps_v_e_m_s, wind_e_m_s
             filtered_m_s = math.sqrt((v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2)
             turned = s.unseen_turn_rad * p.guidance.gps_filter_s / max(lag_s, 1e-3)
-            now_m_s, s.airspeed_known = filtered_m_s * math.hypot(1.0, turned), 1
+            now_m_s, s.airspeed_known = filtered_m_s * math.hypot(1.0, turned) / s.true_factor, 1
     if not s.airspeed_known:
         now_m_s = s.airspeed_wanted_m_s
     now_m_s = clip(now_m_s, SLOWEST * e.airspeed_m_s, FASTEST * e.airspeed_m_s)
@@ -155,7 +161,7 @@ def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s): 
         s.ground_m_s = math.hypot(row.gps_v_e_m_s[0], row.gps_v_e_m_s[1]) * math.hypot(1.0, turned)
         if towards_north == 0.0 and towards_east == 0.0:
             towards_north, towards_east = north, east
-        now_m_s = (s.airspeed_m_s - s.ground_m_s) * (towards_north * north + towards_east * east)
+        now_m_s = (s.true_factor * s.airspeed_m_s - s.ground_m_s) * (towards_north * north + towards_east * east)
         if is_wind(wind_e_m_s, 2):
             now_m_s = -(towards_north * wind_e_m_s[0] + towards_east * wind_e_m_s[1])
     now_m_s = max(now_m_s, 0.0)
@@ -165,7 +171,7 @@ def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s): 
 
 @kernel
 def speed_to_fly(headwind_m_s, e):  # type: ignore[no-untyped-def]
-    """Airspeed, m/s, of minimum energy per distance against a headwind W; at least cruise.
+    """Airspeed, m/s, of minimum energy per distance against a headwind W; at least cruise.  Both are equivalent ones.
 
     Energy per distance over the ground is D V / (V - W).  With the drag a V^2 + b / V^2 and V_g^4 = b / a, the best
     glide, its minimum is where 2 V^3 - 3 W V^2 = V_g^4 (2 / V - W / V^2): V_g in calm air, 3/2 W in a strong wind;
@@ -186,7 +192,7 @@ def want_airspeed(setpoint, travels, s, e):  # type: ignore[no-untyped-def]
     if travels and setpoint.radio and math.isfinite(setpoint.airspeed_m_s):
         wanted_m_s = clip(setpoint.airspeed_m_s, least_airspeed(s, e), e.fastest_m_s)
     elif travels:
-        wanted_m_s = max(wanted_m_s, speed_to_fly(s.headwind_m_s, e))
+        wanted_m_s = max(wanted_m_s, speed_to_fly(s.headwind_m_s / s.true_factor, e))
     s.airspeed_wanted_m_s = wanted_m_s
 
 
@@ -197,7 +203,8 @@ def level_flight(s, e):  # type: ignore[no-untyped-def]
     s : record with `airspeed_wanted_m_s` and `inverted`   e : record of EnergyParams
     """
     v = s.airspeed_wanted_m_s
-    throttle = e.throttle_trim + e.throttle_per_speed_s_m * (v - e.airspeed_m_s)
+    # The drag is that of sea level; in thinner air propeller and aeroplane are faster alike.
+    throttle = s.true_factor * (e.throttle_trim + e.throttle_per_speed_s_m * (v - e.airspeed_m_s))
     lift = (e.airspeed_m_s / v) ** 2
     if s.inverted:
         return -e.pitch_trim_rad + e.pitch_per_lift_rad * (lift + 1.0), throttle + e.throttle_inverted
@@ -269,11 +276,11 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     gain_m_s = 0.0
     if s.airspeed_known:
         gain_m_s2 = e.gain_per_speed_1_s * (s.airspeed_wanted_m_s - s.airspeed_m_s)
-        gain_m_s = s.airspeed_m_s / G_M_S2 * clip(gain_m_s2, -e.gain_limit_m_s2, e.gain_limit_m_s2)
+        gain_m_s = s.true_factor * s.airspeed_m_s / G_M_S2 * clip(gain_m_s2, -e.gain_limit_m_s2, e.gain_limit_m_s2)
     energy_m_s = climb_m_s + gain_m_s
     throttle, given_m_s = throttle_of(energy_m_s, trim, s, e)
     climb_m_s = min(e.height_weight * climb_m_s + (1.0 - e.height_weight) * (given_m_s - gain_m_s), most_m_s)
-    pitch_rad = trim_rad + climb_m_s / s.airspeed_wanted_m_s + s.climb_integral_rad
+    pitch_rad = trim_rad + climb_m_s / (s.true_factor * s.airspeed_wanted_m_s) + s.climb_integral_rad
 
     if e.height_weight > 0.0:  # otherwise the climb follows from the speed
         climb_missing_m_s = climb_m_s + sinking_m_s if math.isfinite(missing_m) else 0.0

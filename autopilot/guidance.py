@@ -103,15 +103,16 @@ def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, p):  # type: ignore[n
     pointing home instead of turning to where it drifts.
 
     R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured
-    s : record with `airspeed_m_s`, `unseen_turn_rad`
+    s : record with `airspeed_m_s`, `true_factor`, `unseen_turn_rad`
     """
     north, east = unit(R_eb[0, 0], R_eb[1, 0])
     if not on_nose:
         return north, east
     if is_wind(wind_e_m_s, 2):
-        wind_m_s, most_m_s = math.hypot(wind_e_m_s[0], wind_e_m_s[1]), p.wind_share * s.airspeed_m_s
+        true_m_s = s.true_factor * s.airspeed_m_s
+        wind_m_s, most_m_s = math.hypot(wind_e_m_s[0], wind_e_m_s[1]), p.wind_share * true_m_s
         part = most_m_s / wind_m_s if wind_m_s > most_m_s else 1.0
-        return unit(s.airspeed_m_s * north + part * wind_e_m_s[0], s.airspeed_m_s * east + part * wind_e_m_s[1])
+        return unit(true_m_s * north + part * wind_e_m_s[0], true_m_s * east + part * wind_e_m_s[1])
     v = row.gps_v_e_m_s
     if math.isfinite(gps_age(row, p)) and math.hypot(v[0], v[1]) > 3.0:
         cosine, sine = math.cos(s.unseen_turn_rad), math.sin(s.unseen_turn_rad)

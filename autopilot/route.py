@@ -216,7 +216,7 @@ def bank_along_route(north, east, r_zy, wind_e_m_s, row, height_m, setpoint, s, 
     to, then = setpoint.route[s.next_waypoint], setpoint.route[(s.next_waypoint + 1) % setpoint.n_waypoints]
     then_north, then_east = unit(then[0] - to[0], then[1] - to[1])
     sine, cosine = heading_error(along_north, along_east, then_north, then_east)
-    then_m_s = speed_along(then_north, then_east, wind_e_m_s, s.airspeed_wanted_m_s)
+    then_m_s = speed_along(then_north, then_east, wind_e_m_s, s.true_factor * s.airspeed_wanted_m_s)
     mean_m_s = 0.5 * (speed_m_s + max(then_m_s, p.slowest_m_s)) if math.isfinite(then_m_s) else speed_m_s
     if left_m < begin_of_turn(mean_m_s, sine, cosine, limit_rad, p):
         s.leg_from_m[0], s.leg_from_m[1], s.leg_from_m[2] = to[0], to[1], to[2]

@@ -127,7 +127,7 @@ def rate_demand(R_eb, omega_b_rad_s, bank_rad, pitch_rad, up, airspeed_m_s, p): 
     the lift points up: if inverted, the aeroplane rolls first.
 
     R_eb : shape (3, 3)   bank_rad, pitch_rad : demanded; a positive bank turns right over the ground in both cases
-    up : 1 upright, -1 inverted   airspeed_m_s : known or assumed   p : record of StabiliseParams
+    up : 1 upright, -1 inverted   airspeed_m_s : true, known or assumed   p : record of StabiliseParams
     """
     r_zx, r_zy, r_zz = R_eb[2, 0], R_eb[2, 1], R_eb[2, 2]
     turn = turn_rate(R_eb, up, airspeed_m_s)
@@ -142,13 +142,13 @@ def rate_demand(R_eb, omega_b_rad_s, bank_rad, pitch_rad, up, airspeed_m_s, p): 
 
 
 @kernel
-def extra_lift(pitch_rate_rad_s, r_zz, airspeed_m_s, p):  # type: ignore[no-untyped-def]
+def extra_lift(pitch_rate_rad_s, r_zz, airspeed_m_s, true_factor, p):  # type: ignore[no-untyped-def]
     """Lift coefficient of a pitch rate over that at cruise, minus 1: (V q / g + r_zz) (V_c / V)^2 - 1.
 
     At cruise speed it is the extra load factor: 1 / r_zz - 1 in a level turn, V q / g at the bottom of a loop,
-    V q / g - 2 at its top, -2 in inverted level flight.
+    V q / g - 2 at its top, -2 in inverted level flight.  V q takes the true airspeed, V_c / V equivalent ones.
     """
-    load = airspeed_m_s * pitch_rate_rad_s / G_M_S2 + r_zz
+    load = true_factor * airspeed_m_s * pitch_rate_rad_s / G_M_S2 + r_zz
     slower = p.airspeed_m_s / airspeed_m_s
     return clip(load * slower * slower, -p.inverted_lift, 1.0 + p.load_limit) - 1.0
 
@@ -162,14 +162,15 @@ def hold(integral, error, gain, control, limit, dt_s):  # type: ignore[no-untype
 
 
 @kernel
-def rate_control(demand, R_eb, omega_b_rad_s, airspeed_m_s, s, p, dt_s):  # type: ignore[no-untyped-def]
+def rate_control(demand, R_eb, omega_b_rad_s, airspeed_m_s, true_factor, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Roll, pitch and yaw control, about -1..1, to follow the demanded rates.
 
     The integral of a rate error holds an angle; it compensates motor torque, trim and gyro bias.  The gains are those
     of cruise: a deflection gives a moment ~ V^2 against damping ~ V, so that it scales with 1 / V for the same rate.
 
-    demand : (p, q, r), rad/s   omega_b_rad_s : shape (3,), drift-corrected   airspeed_m_s : known or assumed
-    s : record with `roll_integral`, `pitch_integral`, updated   p : record of StabiliseParams
+    demand : (p, q, r), rad/s   omega_b_rad_s : shape (3,), drift-corrected   airspeed_m_s : equivalent, known or
+    assumed   true_factor : true airspeed over it   s : record with `roll_integral`, `pitch_integral`, updated
+    p : record of StabiliseParams
     """
     slower = p.airspeed_m_s / airspeed_m_s
     roll_wanted, pitch_wanted, yaw_wanted = slower * demand[0], slower * demand[1], slower * demand[2]
@@ -178,7 +179,7 @@ def rate_control(demand, R_eb, omega_b_rad_s, airspeed_m_s, s, p, dt_s):  # type
     yaw_missing = yaw_wanted - slower * omega_b_rad_s[2]
     roll = p.roll_control_per_rate_s * roll_wanted + p.roll_control_per_rate_error_s * roll_missing + s.roll_integral
     pitch = (
-        p.elevator_per_load * extra_lift(demand[1], R_eb[2, 2], airspeed_m_s, p)
+        p.elevator_per_load * extra_lift(demand[1], R_eb[2, 2], airspeed_m_s, true_factor, p)
         + p.elevator_per_pitch_rate_s * pitch_wanted
         + p.elevator_per_rate_error_s * pitch_missing
         + s.pitch_integral

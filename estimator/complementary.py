@@ -28,7 +28,7 @@ import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip
-from estimator.blocks.screening import FORCE_GOOD, GPS, refuse, screen, take_rate
+from estimator.blocks.screening import AT_LIMIT_S, FORCE_GOOD, GPS, refuse, screen, take_rate, watch_limit
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Column, ImuSample
 from estimator.params.shared import Params
@@ -133,9 +133,10 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     learn = s.dt_s / (s.tilt_s * s.bias_s)
     for i, tilt in enumerate((x, y, z)):
         s.gyro_bias_b_rad_s[i] = clip(s.gyro_bias_b_rad_s[i] - learn * tilt, -MAX_BIAS_RAD_S, MAX_BIAS_RAD_S)
+    watch_limit(s.gyro_bias_b_rad_s, MAX_BIAS_RAD_S, s)
     if not s.aligned:
         return STARTING
-    return POOR if s.spoilt or s.fix_age_s > FIX_LIFE_S else GOOD
+    return POOR if s.spoilt or s.fix_age_s > FIX_LIFE_S or s.at_limit_s >= AT_LIMIT_S else GOOD
 
 
 @kernel

@@ -58,7 +58,7 @@ from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import cross, dot, put, wrap
 from estimator.blocks.magnetometer import FIELD, take_field, turn_to_north
 from estimator.blocks.pi import corrected_rate, feed_back, weigh
-from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen
+from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen, watch_limit
 from estimator.compiler.jit import kernel
 from estimator.interface import Array, Column, HeadingReference, ImuSample
 from estimator.params.dilshad import DilshadParams as DilshadParams
@@ -198,6 +198,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             s.yaw_b[i] = s.drift * s.R_eb[2, i]  # Premerlani's Eqn 24
         weigh(s.w_rp, s.roll_pitch_b, s.w_y, s.yaw_b, s.total_b)
         feed_back(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_p_b, s.omega_i_b)
+        watch_limit(s.omega_i_b, s.offset_limit_rad_s, s)
     return health_of(s, s.aligned, s.heading_age_s <= HEADING_LIFE_S)
 
 

@@ -45,7 +45,7 @@ from estimator.blocks.gyro_frame import (
 from estimator.blocks.kernels import cross, dot, put
 from estimator.blocks.magnetometer import FIELD, take_field
 from estimator.blocks.pi import feed_back
-from estimator.blocks.screening import GPS, health_of, refuse, screen, take_rate
+from estimator.blocks.screening import GPS, health_of, refuse, screen, take_rate, watch_limit
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
@@ -263,6 +263,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         if not sum_up(row, s, good, s.t_s - t_before):
             s.locked = 0
         attitude(s)
+        watch_limit(s.omega_i_b, s.offset_limit_rad_s, s)
         s.fix_age_s += s.dt_s
         if row.gps_new:
             take_fix(row, s)

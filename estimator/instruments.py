@@ -25,7 +25,7 @@ class Property(NamedTuple):
     assumed: float | bool | None = None
 
 
-# Assumed: a present-day receiver, and a present-day inertial unit of 2000 deg/s and 16 g.
+# Assumed: a present-day receiver, a present-day inertial unit of 2000 deg/s and 16 g, and a place at sea level.
 PROPERTIES: Mapping[str, Property] = {
     "gps_filter_s": Property("time constant of the receiver's velocity filter; 0 is none", 0.0),
     "gps_latency_s": Property("from the moment a fix is true to its arrival", 0.3),
@@ -44,12 +44,14 @@ PROPERTIES: Mapping[str, Property] = {
     "force_bias_sigma_m_s2": Property("standard deviation of the accelerometer bias"),
     "imu_rate_hz": Property("inertial samples per second"),
     "declination_rad": Property("magnetic north from true north, positive to the east"),
+    "elevation_m": Property("elevation of the launch place above the sea", 0.0),
     "use_magnetometer": Property("whether a magnetometer is fitted and used"),
     "magnetometer_calibrated": Property("whether its readings are free of iron and motor, by nature or by calibration"),
     "use_airspeed": Property("whether an airspeed sensor is fitted and used"),
 }
 """Every property: name, spelled as the parameters of estimators and autopilots -> its meaning."""
 
+DEEPEST_M, HIGHEST_M = -500.0, 9000.0  # places on earth
 SIGMA_KNOWN_S = 0.02  # standard deviation of a latency from a data sheet or a log
 
 BOOLEAN = frozenset(
@@ -75,7 +77,9 @@ def property_value(name: str, value: Any) -> float | bool:
         number = float(value)
     except (TypeError, ValueError):
         raise ValueError(f"{name} = {value!r}: must be a number") from None
-    if math.isnan(number) or (number < 0.0 and name != "declination_rad"):
+    if name == "elevation_m" and not DEEPEST_M <= number <= HIGHEST_M:
+        raise ValueError(f"{name} = {value!r} m: must be {DEEPEST_M:g} to {HIGHEST_M:g} m above the sea")
+    if math.isnan(number) or (number < 0.0 and name not in ("declination_rad", "elevation_m")):
         raise ValueError(f"{name} = {value!r}: must be a number, zero or more")
     return number
 

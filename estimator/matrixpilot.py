@@ -54,7 +54,7 @@ import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip, cross, put, wrap
-from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen, take_rate
+from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen, take_rate, watch_limit
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, Column, ImuSample
 from estimator.params.matrixpilot import CLASSIC as CLASSIC
@@ -358,6 +358,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             s.roll_pitch_b[0] = s.roll_pitch_b[1] = s.roll_pitch_b[2] = 0.0
         take_report(row, s)
         feed_back(s)
+        watch_limit(s.omega_i_b, INTEGRAL_LIMIT_RAD_S, s)
     return health_of(s, s.locked, s.fix_age_s <= FIX_LIFE_S)
 
 

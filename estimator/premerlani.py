@@ -35,10 +35,11 @@ integral would learn it as an offset of the pitch gyro.
 *Launch gate.*  While the length of ``g_reference`` is not that of gravity, it contains forward acceleration or a wrong
 speed: no roll-pitch correction then.
 
-*Speed through the air.*  In wind the ground speed of Eqn 25 is not the speed that turns the aeroplane.  The best
-available speed is used: that of the airspeed sensor; with `turn_speed` one learnt in level turns (a turn about the
-vertical accelerates horizontally: the speed for which ``g_reference`` is at right angles to ``omega x V``; MatrixPilot
-has used such a speed since 2017); with `learn_wind` ground velocity less wind.
+*Speed through the air.* In wind the ground speed of Eqn 25 is not the speed that turns the aeroplane. The best
+available speed is used: that of the airspeed sensor, as true airspeed (`estimator.blocks.air`); with `turn_speed` one
+learnt in level turns (a turn about the vertical accelerates horizontally: the speed for which ``g_reference`` is at
+right angles to ``omega x V``; MatrixPilot has used such a speed since 2017); with `learn_wind` ground velocity less
+wind.
 
 *Wind* (off by default; the paper: "somehow compute the wind vector").  Learnt in turns, `estimator.blocks.wind`.  The
 reference of Eqn 22 is then the direction of ground velocity less wind, and the heading converges to the nose.
@@ -57,6 +58,7 @@ import math
 
 import numpy as np
 
+from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.gps_lag import (
     LAG,
@@ -68,7 +70,7 @@ from estimator.blocks.gps_lag import (
 )
 from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
-from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen
+from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen, watch_limit
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
@@ -113,7 +115,7 @@ def take_air(row, s):  # type: ignore[no-untyped-def]
     """Take an airspeed that arrived."""
     s.air_age_s += s.dt_s
     if s.use_airspeed and airspeed_came(row, s) and row.equivalent_airspeed_m_s > 0.0:
-        s.airspeed_m_s = row.equivalent_airspeed_m_s
+        s.airspeed_m_s = row.equivalent_airspeed_m_s * true_airspeed_factor(row, s.elevation_m)
         s.air_age_s = 0.0
 
 
@@ -245,6 +247,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         corrected_rate(row, s, good)
         if s.learning:  # of the previous sample: the processor need not wait for it, and it changes slowly
             learn_offset(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_i_b)
+        watch_limit(s.omega_i_b, s.offset_limit_rad_s, s)
         if not integrate(s.R_eb, s.omega_total_b, s.dt_s):  # Eqns 17-21
             s.locked = 0
         filter_nose(s)

@@ -12,7 +12,7 @@ Sensors        generic
 Passes when    it glides for 30 s and is far enough away by then (in the stronger winds, half as far); it never comes
                near the stall, at an angle of attack of 10 degrees, and never banks steeply; the inclination error is
                small, and the heading settles within 20 s of the release, in the variants sooner
-Variants       ``calm``, without wind; ``head_wind`` and ``cross_wind``, 3 m/s, 40 % of the airspeed; ``gust``,
+Variants       ``calm``, without wind; ``head_wind`` and ``cross_wind``, 3 m/s, 41 % of the airspeed; ``gust``,
                4 m/s more from the side, beginning at the release and over within 2 s
 =============  ===================================================================================================
 """

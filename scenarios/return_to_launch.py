@@ -13,7 +13,7 @@ Variants       Home from downwind, where it is carried 100 m further before it h
                8 m/s, 63 % of the airspeed; ``strong_wind_nose``: the same with an estimator of the nose's heading,
                which learns the wind in the turn; ``stronger_wind``: against 11 m/s, 87 % of the cruise speed, which
                would take five minutes at cruise.  The autopilot flies the speed that takes the least energy per
-               distance over ground: 13.5 m/s against 8, and 17.2 against 11.  That makes 5.5 and 6.2 m/s over ground,
+               distance over ground: 13.3 m/s against 8, and 17.2 against 11.  That makes 5.3 and 6.2 m/s over ground,
                or 75 s and 65 s, plus the turn; the limits are about half as much again
 =============  ===================================================================================================
 """

@@ -14,9 +14,9 @@ Passes when    it survives; from 20 s to the end the inclination error is small;
                variants must truly bank, keep their height within 15 m, and keep the inclination error small while
                banked, too
 Variants       ``bank_30``, ``bank_45``, ``bank_60``: the turns at that bank, 25 s apart; at 60 degrees the wings carry
-               2 g.  In a turn the error is mostly due to the wind, because Eqn 25 uses the speed over ground: over
-               seeds 0 to 3, at 30, 45 and 60 degrees of bank, it is 5.9, 6.4 and 5.0 degrees RMS; in calm air 2.6, 3.1
-               and 3.3; with ``estimator_params.turn_speed=true`` 2.2, 2.8 and 3.6
+               2 g.  In a turn the error is mostly due to the wind, because Eqn 25 uses the speed over ground: at 30,
+               45 and 60 degrees of bank it is 5 to 6 degrees RMS; in calm air, and with
+               ``estimator_params.turn_speed=true``, 2 to 4 degrees
 =============  ===================================================================================================
 """
 

@@ -3,7 +3,15 @@
 from dataclasses import dataclass
 from fractions import Fraction
 
-_SAMPLED_HZ = (1, 2, 2.5, 4, 5, 8, 10, 12.5, 20, 25, 40, 50, 100, 200)  # suggested for an invalid rate
+_SAMPLED_HZ = (1, 2, 2.5, 4, 5, 8, 10, 12.5, 20, 25, 40, 50, 100, 200, 400)  # suggested for an invalid rate
+
+
+PHYSICS_HZ = 200  # where nothing needs more
+
+
+def physics_hz(imu_hz: int) -> int:
+    """Physics rate for an inertial rate: PHYSICS_HZ, or the inertial rate itself where that is higher."""
+    return max(PHYSICS_HZ, imu_hz)
 
 
 def _divides(rate_hz: float, base_hz: int) -> bool:
@@ -18,7 +26,7 @@ class Rates:
     between two ticks is delivered in the first tick that ends at or after its arrival.
     """
 
-    physics_hz: int = 200
+    physics_hz: int = PHYSICS_HZ
     imu_hz: int = 50
     gps_hz: float = 4.0
 
@@ -26,7 +34,7 @@ class Rates:
         if self.physics_hz not in (100, 200, 400, 1000):
             raise ValueError(f"physics rate {self.physics_hz} Hz: choose 100, 200, 400 or 1000 Hz")
         for what, rate, choices in (
-            ("inertial rate", self.imu_hz, (40, 50, 100, 200)),
+            ("inertial rate", self.imu_hz, (40, 50, 100, 200, 400)),
             ("GPS rate", self.gps_hz, (1, 2, 2.5, 4, 5, 10)),
         ):
             possible = [c for c in choices if _divides(c, self.physics_hz)]

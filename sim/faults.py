@@ -1,8 +1,8 @@
 """Faults of a flight: one failure of one channel in one time window, whatever the channel belongs to.
 
-A channel belongs to a family: the sensors (`sim.sensors.faults`) or what moves the aeroplane
-(`sim.aeroplane.actuators`).  Each family says which channels
-and kinds it has, what values a fault takes and what they mean.
+A channel belongs to a family: the sensors (`sim.sensors.faults`), the inertial samples (`sim.sensors.sampling`) or
+what moves the aeroplane (`sim.aeroplane.actuators`).  Each family says which channels and kinds it has, what values a
+fault takes and what they mean.
 """
 
 import math
@@ -13,10 +13,11 @@ from typing import Final, Literal, NamedTuple
 
 from sim.aeroplane import actuators
 from sim.sensors import faults as sensors
+from sim.sensors import sampling
 
 LATEST_S: Final = 36000.0
 
-FamilyName = Literal["sensor", "actuator"]
+FamilyName = Literal["sensor", "imu", "actuator"]
 
 
 class Family(NamedTuple):
@@ -40,6 +41,9 @@ FAMILIES: Final = (
     Family(
         "sensor", sensors.CHANNELS, sensors.kinds_of, sensors.defaults_of, sensors.unit_of,
         sensors.wrong_values,
+    ),
+    Family(
+        "imu", sampling.CHANNELS, sampling.kinds_of, sampling.defaults_of, sampling.unit_of, sampling.wrong_values,
     ),
     Family(
         "actuator", actuators.CHANNELS, actuators.kinds_of, actuators.defaults_of, actuators.unit_of,

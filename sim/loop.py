@@ -48,6 +48,7 @@ def fly(
         with listening():
             plant.reset(log)
             suite.reset(log)
+            lossy = suite.loses_samples
             reference = make_ready(estimator, autopilot, log)
             for k in range(len(log)):
                 if (ended := plant.advance(k, command)) is not None:
@@ -59,6 +60,10 @@ def fly(
                     continue
                 if k == n_calibration:
                     power_up(estimator, mean_sample(log.measured[:k]) if k else on_ground)
+                if lossy and suite.lost(k):  # no sample, no pass: the last estimate and command stay
+                    log.flown[k] = log.flown[k - 1]
+                    check()
+                    continue
                 setpoint = script.at(k * plant.dt_s + to_release_s)
                 began_ns = perf_counter_ns()
                 estimate = estimate_of(estimator, measured, log.flown, k)

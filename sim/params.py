@@ -32,7 +32,8 @@ def unit_of(name: str) -> str:
 
 # Fields whose names differ from another field of the part only by the unit.
 _WORDS = {
-    "wander_s": "wander time", "velocity_wander_s": "velocity wander time", "warming_s": "warming time",
+    "drift_s": "drift time", "wander_s": "wander time", "velocity_wander_s": "velocity wander time",
+    "warming_s": "warming time",
     "motor_rpm": "motor speed", "vibration_deg_s": "vibration turning", "vibration_rpm": "vibration at speed",
 }  # fmt: skip
 

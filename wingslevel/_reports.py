@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, overload
 
 from wingslevel._conditions import Estimator, plain, seeds_of
@@ -87,20 +88,22 @@ def _rows(data: Mapping[str, Any], start: str = "") -> Any:
 @overload
 def aircraft() -> dict[str, str]: ...
 @overload
-def aircraft(name: str) -> Report: ...
-def aircraft(name: str | None = None) -> dict[str, str] | Report:
+def aircraft(name: str, overrides: Mapping[str, Any] = ...) -> Report: ...
+def aircraft(name: str | None = None, overrides: Mapping[str, Any] = MappingProxyType({})) -> dict[str, str] | Report:
     """Names of the aircraft with a line about each; or the performance page of one.
+
+    overrides : differences from the drawing: ``{"airframe.mass_factor": 1.1}``
 
     Raises
     ------
-    WingslevelError     no aircraft of that name
+    WingslevelError     no aircraft of that name, no such difference, or an aeroplane that cannot fly with it
     """
     if name is None:
         return listed("aircraft")
     from scenarios.harness.commands.aircraft import make
 
     with quietly():
-        book = make(name)
+        book = make(name, overrides)
 
     def draw(path: Path) -> None:
         from scenarios.harness.commands import aircraft_picture

@@ -35,6 +35,7 @@ import numpy as np
 
 from estimator.ap_dcm.wind import AIR_LIFE_S, learn_wind
 from estimator.ap_dcm.yaw import FIX_LIFE_S, MIN_SPEED_M_S, SPIN_LIMIT_RAD_S, correct_yaw, spin_gain
+from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.magnetometer import FIELD, take_field
@@ -114,7 +115,8 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
     if s.use_magnetometer and take_field(row, s):
         s.new_field, s.field_age_s = 1, 0.0
     if airspeed_came(row, s):
-        s.airspeed_m_s, s.air_age_s = max(row.equivalent_airspeed_m_s, 0.0), 0.0
+        factor = true_airspeed_factor(row, s.elevation_m)  # EAS2TAS
+        s.airspeed_m_s, s.air_age_s = factor * max(row.equivalent_airspeed_m_s, 0.0), 0.0
 
 
 @kernel

@@ -16,6 +16,8 @@ from estimator.rotation import from_euler
 SHORTEST_INTERVAL_S = 1e-6  # no gyro samples faster; quotients by an interval stay finite
 LONGEST_GAP_S = 0.5  # after a longer gap the attitude is unknown: the estimate continues from where it was
 CLOCK_BACK_S = 1.0  # a time this far back means that the clock was set
+# An offset that is learnt up to a limit, and has been this close to it for this long, is larger than can be learnt.
+AT_LIMIT, AT_LIMIT_S = 0.98, 10.0
 COAST_S = 0.25  # how long the last good rate replaces rejected ones
 # Beyond these a mean sample is not at rest; gyros are sold with offsets of up to +-40 deg/s.
 AT_REST_RAD_S, AT_REST_G = math.radians(45.0), 0.2
@@ -37,6 +39,7 @@ SCREEN = (
     Column("dt_s", (), "time that this tick covers"),
     Column("bad_s", (), "time without a good gyro sample"),
     Column("rejected", (), "ticks in which something was rejected", integer=True),
+    Column("at_limit_s", (), "how long what is learnt has been at its limit"),
     Column("spoilt", (), "1 if this tick is already counted there", integer=True),
     Column("refused", (len(REFUSED),), "rejected samples by instrument, see REFUSED", integer=True),
 )
@@ -132,13 +135,27 @@ def airspeed_came(row, s):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def watch_limit(learnt_b, limit, s):  # type: ignore[no-untyped-def]
+    """Record how long `learnt_b`, shape (3,), has been at its `limit`: an axis there for `AT_LIMIT_S` is an illness.
+
+    The offset of the gyro is then larger than what is subtracted, and the rest of it goes into the attitude.
+    """
+    near = AT_LIMIT * limit
+    at_limit = (abs(learnt_b[0]) >= near) | (abs(learnt_b[1]) >= near) | (abs(learnt_b[2]) >= near)
+    s.at_limit_s = s.at_limit_s + s.dt_s if at_limit else 0.0
+
+
+@inlined
 def health_of(s, found, referenced):  # type: ignore[no-untyped-def]
-    """The `Health` of this tick: STARTING until the heading is `found`, GOOD while a fresh reference corrects it."""
+    """The `Health` of this tick: STARTING until the heading is `found`, GOOD while a fresh reference corrects it.
+
+    POOR while a sample is rejected, without a reference, and at a limit, see `watch_limit`.
+    """
     if s.spoilt:
         return POOR
     if not found:
         return STARTING
-    return GOOD if referenced else POOR
+    return GOOD if referenced and s.at_limit_s < AT_LIMIT_S else POOR
 
 
 @inlined

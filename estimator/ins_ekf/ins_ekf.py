@@ -54,9 +54,20 @@ import math
 
 import numpy as np
 
+from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.magnetometer import FIELD, take_field
-from estimator.blocks.screening import COAST_S, FORCE_GOOD, GPS, GYRO_GOOD, airspeed_came, refuse, screen
+from estimator.blocks.screening import (
+    AT_LIMIT_S,
+    COAST_S,
+    FORCE_GOOD,
+    GPS,
+    GYRO_GOOD,
+    airspeed_came,
+    refuse,
+    screen,
+    watch_limit,
+)
 from estimator.compiler.jit import kernel
 from estimator.ins_ekf.flight import (
     CUT_FORCE,
@@ -76,6 +87,7 @@ from estimator.ins_ekf.kernels import (
     FORCE,
     FULL,
     GAIN,
+    GYRO_LIMIT,
     LAG,
     LATENCY,
     TILT,
@@ -142,7 +154,7 @@ _AROUND = (
     Column("w_fix_early_s", (SIZE,), "time from that to its end"),
     Column("w_fix_latency_s", (SIZE,), "latency with which it was placed"),
     Column("w_mag_b_ut", (SIZE, 3), "field measured in it"),
-    Column("w_airspeed_m_s", (SIZE,), "airspeed measured in it"),
+    Column("w_airspeed_m_s", (SIZE,), "true airspeed measured in it"),
 )
 STATE_DTYPE = state_dtype(InsEkfParams, *FIELD, *_FILTER, *_AROUND)
 
@@ -218,7 +230,7 @@ def attach_others(row, s):  # type: ignore[no-untyped-def]
     if s.use_airspeed and airspeed_came(row, s):
         s.air_age_s = 0.0
         s.w_bits[i] |= HAS_AIR
-        s.w_airspeed_m_s[i] = max(row.equivalent_airspeed_m_s, 0.0)
+        s.w_airspeed_m_s[i] = true_airspeed_factor(row, s.elevation_m) * max(row.equivalent_airspeed_m_s, 0.0)
 
 
 # The present
@@ -260,6 +272,9 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
             reach_present(s)
         if not renormalise(s.R_eb):
             level(s.R_eb)
+        limit = GYRO_LIMIT * s.gyro_bias_sigma_rad_s
+        bias, start = s.gyro_bias_b_rad_s, s.calibrated_offset_b_rad_s
+        watch_limit((bias[0] - start[0], bias[1] - start[1], bias[2] - start[2]), limit, s)
         s.wind_known = s.aligned and s.P[WIND_NE, WIND_NE] + s.P[WIND_NE + 1, WIND_NE + 1] < WIND_KNOWN_M_S**2
     return health(s, s.rejected != before)
 
@@ -270,7 +285,7 @@ def health(s, rejecting):  # type: ignore[no-untyped-def]
     if not s.aligned:
         return STARTING
     tilt = s.P[TILT, TILT] + s.P[TILT + 1, TILT + 1]
-    if rejecting or s.fix_age_s > FIX_LIFE_S or not tilt < GOOD_TILT_RAD**2:
+    if rejecting or s.fix_age_s > FIX_LIFE_S or s.at_limit_s >= AT_LIMIT_S or not tilt < GOOD_TILT_RAD**2:
         return POOR
     return GOOD if s.P[TILT + 2, TILT + 2] < GOOD_HEADING_RAD**2 else STARTING
 

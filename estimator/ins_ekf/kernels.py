@@ -40,7 +40,8 @@ CUT_RAD_S, CUT_M_S2, CUT_S = 1.0, 10.0, 0.1  # sigma and correlation time of the
 CROSS_S = 2.0  # correlation time of an error that turns with the body: about a radian of turn
 FORCE_GAIN_SHARE = 0.5  # relative gain error of an accelerometer per bias sigma in g: at high load it errs by more
 LATENCY_WALK_S_SQRT_S = 0.001  # random walk of the latency, sigma after one second
-BIAS_LIMIT = 6.0  # limit of bias, gain and wind, in initial sigmas
+BIAS_LIMIT = 6.0  # limit of gain, wind and the bias of the force, in initial sigmas
+GYRO_LIMIT = 12.0  # limit of the gyro bias, likewise
 
 
 @kernel
@@ -262,12 +263,13 @@ def correct_state(s, innovation):  # type: ignore[no-untyped-def]
     """Add gain times innovation to the estimate (Sola 6.2)."""
     k = s.gain
     turn_in_earth(s.R_filter_eb, k[0] * innovation, k[1] * innovation, k[2] * innovation)
+    limit = GYRO_LIMIT * s.gyro_bias_sigma_rad_s
     for i in range(3):
         s.v_e_m_s[i] += k[VEL + i] * innovation
         s.lagged_v_e_m_s[i] += k[LAG + i] * innovation
         calibrated = s.calibrated_offset_b_rad_s[i]
         change = s.gyro_bias_b_rad_s[i] - calibrated + k[BIAS + i] * innovation
-        s.gyro_bias_b_rad_s[i] = calibrated + within(change, 2.0 * s.gyro_bias_sigma_rad_s)
+        s.gyro_bias_b_rad_s[i] = calibrated + clip(change, -limit, limit)
         s.gyro_gain[i] = within(s.gyro_gain[i] + k[GAIN + i] * innovation, s.gyro_gain_sigma)
         s.force_bias_b_m_s2[i] = within(s.force_bias_b_m_s2[i] + k[FORCE + i] * innovation, s.force_bias_sigma_m_s2)
     for i in range(2):

@@ -64,6 +64,8 @@ class ApDcmParams(MagnetometerParams):
         on: the course can stand in for the heading, the airspeed for the motion; off: neither
     estimate_wind : switch  learn the wind in turns, and from airspeed where there is a sensor
         on: the wind is reported, and used to judge the compass; off: it counts as zero
+    elevation_m : m  elevation of the launch place above the sea, for the density of the air
+        higher: a measured airspeed counts as a faster motion; lower: as a slower one
     """
 
     quirks: frozenset[Quirk] = frozenset()
@@ -77,6 +79,7 @@ class ApDcmParams(MagnetometerParams):
     use_magnetometer: bool | None = None
     fly_forward: bool = True
     estimate_wind: bool = True
+    elevation_m: float = 0.0
 
     def __post_init__(self) -> None:
         if isinstance(self.quirks, str):  # as typed: --set quirks=vertical_clip,stuck_p_gain

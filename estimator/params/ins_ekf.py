@@ -90,6 +90,8 @@ class InsEkfParams(MagnetometerParams):
         higher: the heading is found later; lower: a noisy start
     gate : sigma  innovations beyond so many of their sigmas are rejected
         higher: outliers get in; lower: good fixes are rejected in hard manoeuvres
+    elevation_m : m  elevation of the launch place above the sea, for the density of the air
+        higher: a measured airspeed counts as a faster motion; lower: as a slower one
     """
 
     _unlimited: ClassVar = ("gyro_full_scale_rad_s", "force_full_scale_m_s2")
@@ -124,6 +126,7 @@ class InsEkfParams(MagnetometerParams):
     magnetic_noise_rad: float = math.radians(5.0)
     min_speed_m_s: float = 3.0
     gate: float = 5.0
+    elevation_m: float = 0.0
 
     @property
     def longest_latency_s(self) -> float:

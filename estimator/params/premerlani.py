@@ -55,6 +55,8 @@ class PremerlaniParams(Params):
         on: the heading converges to the nose; off: to the course
     min_speed_m_s : m/s  slowest speed at which a course is used
         higher: yaw stays uncorrected for longer at low speed; lower: the noisy course of a slow aeroplane is used
+    elevation_m : m  elevation of the launch place above the sea, for the density of the air
+        higher: a measured airspeed counts as a faster motion; lower: as a slower one
     """
 
     _unlimited: ClassVar = (
@@ -79,6 +81,7 @@ class PremerlaniParams(Params):
     turn_speed: bool = False
     learn_wind: bool = False
     min_speed_m_s: float = 3.0
+    elevation_m: float = 0.0
 
     def __post_init__(self) -> None:
         Params.__post_init__(self)

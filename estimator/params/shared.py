@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 from estimator.blocks.calibration import Calibration
+from estimator.instruments import DEEPEST_M, HIGHEST_M
 from estimator.interface import G_M_S2
 
 GYRO_RANGE_RAD_S = math.radians(2100.0)  # just above the full scale of the largest parts
@@ -35,6 +36,8 @@ class Params:
             positive = name in self._positive or name in self._unlimited
             if name == "declination_rad":
                 right, wanted = abs(value) <= math.pi, "-pi to pi"
+            elif name == "elevation_m":
+                right, wanted = DEEPEST_M <= value <= HIGHEST_M, f"{DEEPEST_M:g} to {HIGHEST_M:g} m above the sea"
             elif name in RANGES:
                 right, wanted = 0.0 < value <= 1e4, "more than zero and at most 10000: no sensor reads more"
             else:

@@ -11,6 +11,7 @@ from estimator.blocks.compiled import BELIEF
 from estimator.blocks.magnetometer import FIELD as FIELD_COLUMNS
 from estimator.blocks.magnetometer import take_field, turn_to_north, write_calibration
 from estimator.blocks.screening import (
+    AT_LIMIT_S,
     FORCE_GOOD,
     GPS,
     SCREEN,
@@ -20,6 +21,7 @@ from estimator.blocks.screening import (
     refuse,
     screen,
     take_rate,
+    watch_limit,
 )
 from estimator.compiler.jit import kernel
 from estimator.interface import (
@@ -76,6 +78,11 @@ def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped
         elif row.gps_speed_m_s >= MIN_SPEED_M_S:
             s.course_rad, s.course_age_s = row.gps_course_rad, 0.0
     return good | COURSE if s.course_age_s <= FIX_LIFE_S else good
+
+
+@kernel
+def _watch_limit(learnt, limit, state):  # type: ignore[no-untyped-def]
+    watch_limit(learnt, limit, state[0])
 
 
 def package(name: str) -> Any:
@@ -148,6 +155,7 @@ class Peer:
     uses: ClassVar[tuple[Instrument, ...]] = ("gyro", "accelerometer", "magnetometer")
     _earth: ClassVar[Array] = NORTH_EAST_DOWN  # the package's earth axes from ours
     _body: ClassVar[Array] = RIGHT_DOWN  # its body components are ours times this
+    _limit_rad_s: ClassVar[float] = math.inf  # largest gyro bias that the package learns, per axis
     _finds_heading: ClassVar[bool] = False  # whether the package itself takes its heading from the first field
 
     def __init__(self, params: PeerParams) -> None:
@@ -161,8 +169,8 @@ class Peer:
             self._state[name][0]
             for name in ("R_eb", "omega_b_rad_s", "gyro_bias_b_rad_s", "force_b_m_s2", "field_b_ut")
         )  # fmt: skip
-        self._dt_s, self._rejected, self._course_rad = (
-            self._state[name] for name in ("dt_s", "rejected", "course_rad")
+        self._dt_s, self._rejected, self._course_rad, self._at_limit_s = (
+            self._state[name] for name in ("dt_s", "rejected", "course_rad", "at_limit_s")
         )
         self._offset_b_rad_s = np.zeros(3)
         self._magnetic = False  # whether the package's north is the magnetic one
@@ -194,7 +202,10 @@ class Peer:
             tells_heading = 0 if self._aligned else good & (FIELD | COURSE)
             q = self._advance(self._heard(good & ~tells_heading))
             if _take_quaternion(q, self._earth, self._body, self._declination_rad, self._state):
-                self._bias_b_rad_s[:] = self._offset_b_rad_s + self._body * self._learnt()
+                learnt = self._learnt()
+                self._bias_b_rad_s[:] = self._offset_b_rad_s + self._body * learnt
+                if self._limit_rad_s < math.inf:
+                    _watch_limit(learnt, self._limit_rad_s, self._state)
                 if tells_heading:
                     self._align(tells_heading)
             else:  # the package diverged: it restarts from the previous attitude
@@ -205,7 +216,7 @@ class Peer:
             self._omega_b_rad_s.copy(),
             self._bias_b_rad_s.copy(),
             None,
-            Health.POOR if self.rejected != before else Health.GOOD,
+            Health.POOR if self.rejected != before or self._at_limit_s[0] >= AT_LIMIT_S else Health.GOOD,
         )
 
     @property

@@ -138,6 +138,7 @@ class Vqf(Keeping):
     """VQF of Laidig and Seel, from the package vqf: 6D, and 9D from the second magnetometer sample on."""
 
     _earth, _body = EAST_NORTH_UP, LEFT_UP
+    _limit_rad_s = math.radians(2.0)  # its parameter biasClip, which stays at its default
     _finds_heading = True
     params: VqfParams
 

@@ -17,7 +17,7 @@ from estimator.instruments import Instruments, Known
 from scenarios.harness.config import FlightConfig
 from scenarios.harness.equipping import Equipped, equipped, params_of
 from scenarios.harness.plugins import Maker
-from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG
+from sim.place import LAUNCH_PLACE, Place
 from sim.power_up import field_on_turn_table
 from sim.sensors.fitting import SuiteParams
 from sim.sensors.known import data_sheets
@@ -27,8 +27,10 @@ def instruments_of(config: FlightConfig, suite: SuiteParams) -> Instruments:
     """What is known aboard under the resolved `config`, which carries `suite`."""
     known = data_sheets(suite, config.rates.build(), config.suite)
     if suite.magnetometer is not None:
-        declination_rad = _declination_rad(suite.magnetometer.year)
+        declination_rad = _declination_rad(config.place.build(), suite.magnetometer.year)
         known["declination_rad"] = Known(declination_rad, "data sheet", "world magnetic model")
+    if config.place.elevation_m != LAUNCH_PLACE.elevation_m:
+        known["elevation_m"] = Known(config.place.elevation_m, "set", "place.elevation_m")
     if config.turn_table:
         known["magnetometer_calibrated"] = Known(True, "set", "turn_table")
     return Instruments(known, config.instruments, config.withheld)
@@ -54,15 +56,17 @@ def equipped_estimator(
     return equipped(spec, instruments, settings), config.model_copy(update={"estimator_params": settings})
 
 
-def _declination_rad(year: float) -> float:
+def _declination_rad(place: Place, year: float) -> float:
     from sim.magnetic_field import field_e_ut  # here, so that flights without a magnetometer do not load the model
 
-    north_ut, east_ut, _ = field_e_ut(LATITUDE_DEG, LONGITUDE_DEG, ELEVATION_M, year)
+    north_ut, east_ut, _ = field_e_ut(place.latitude_deg, place.longitude_deg, place.elevation_m, year)
     return math.atan2(east_ut, north_ut)
 
 
 def _calibration(config: FlightConfig, suite: Any, declination_rad: float) -> Calibration:
     rates = config.rates.build()
     return Calibration.from_turns(
-        field_on_turn_table(suite, rates, config.seed, config.flight, declination_rad=declination_rad)
+        field_on_turn_table(
+            suite, rates, config.seed, config.flight, declination_rad=declination_rad, place=config.place.build()
+        )
     )

@@ -25,7 +25,7 @@ from scenarios.harness.scenario import Scenario, ScriptFailed
 from sim.aeroplane.battery import Battery
 from sim.clock import Rates
 from sim.events import events_of_battery, events_of_faults, events_of_fence
-from sim.faults import Fault, of_family
+from sim.faults import Fault
 from sim.log import Event, Flight, Log, Outcome
 from sim.loop import Watch, fly
 from sim.params import near_misses
@@ -86,10 +86,11 @@ class Prepared:
         faults = [parse_fault(fault) for fault in config.faults]
         plant = build_plant(config, rates, faults)
         airborne = isinstance(config.start, InFlightStart)
-        on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight) if airborne else None
+        place = config.place.build()
+        on_ground = sample_at_rest(self.suite, rates, config.seed, config.flight, place) if airborne else None
         flown = fly(
             plant,
-            Suite(self.suite, rates, config.seed, config.flight, of_family("sensor", faults), plant.release_s),
+            Suite(self.suite, rates, config.seed, config.flight, faults, plant.release_s, place),
             self.estimator.code,
             self.autopilot.code,
             self.script,
@@ -155,7 +156,7 @@ def _prepare(
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
     config = resolve(config, suite)
-    require_sound(config.airframe, config.aircraft, config.rates.physics_hz, config.flies)
+    require_sound(config.airframe, config.aircraft, config.rates.build().physics_hz, config.flies)
     instruments = instruments_of(config, suite)
     estimator, config = equipped_estimator(config, suite, instruments, maker)
     reference = heading_reference_of(estimator.code)

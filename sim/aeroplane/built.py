@@ -117,14 +117,16 @@ def drawn_inertia_kg_m2(aircraft: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def differences_of(built: AsBuilt) -> str:
+    """Differences from the drawing as they are set, separated by commas."""
+    values = zip(AsBuilt.__slots__, astuple(built), astuple(AS_DRAWN), strict=True)
+    return ", ".join(f"airframe.{name} = {value:g}" for name, value, drawn in values if value != drawn)
+
+
 def require_flyable(model: "Model", height_m: float = 60.0) -> None:
     """ValueError if `model` as built has no steady flight at its cruise speed, or diverges in pitch there."""
     speed_m_s = model.airframe["cruise"]["airspeed_m_s"]
-    named = ", ".join(
-        f"airframe.{name} = {value:g}"
-        for name, value, drawn in zip(AsBuilt.__slots__, astuple(model.built), astuple(AS_DRAWN), strict=True)
-        if value != drawn
-    )
+    named = differences_of(model.built)
     try:
         cruise = trim(model, speed_m_s, height_m)
     except ValueError as problem:

@@ -16,7 +16,7 @@ from autopilot.interface import ActuatorCommand
 from estimator.interface import Array
 from sim.aeroplane.built import AIRCRAFT, AS_DRAWN, AsBuilt, model_folder
 from sim.air import Air
-from sim.place import LATITUDE_DEG, LONGITUDE_DEG
+from sim.place import LAUNCH_PLACE, Place, wrapped_deg
 from sim.truth import EARTH_RATE_RAD_S
 
 FT_TO_M = 0.3048
@@ -47,10 +47,10 @@ def _offset(write: Callable[[float], None], off: float) -> Callable[[float], Non
 
 
 class Model:
-    """One JSBSim aeroplane in SI units: loading, placing, wind; each property name is resolved once."""
+    """One JSBSim aeroplane in SI units, at a launch place: loading, placing, wind."""
 
-    def __init__(self, aircraft: str, physics_hz: int, built: AsBuilt = AS_DRAWN) -> None:
-        self.built = built
+    def __init__(self, aircraft: str, physics_hz: int, built: AsBuilt = AS_DRAWN, site: Place = LAUNCH_PLACE) -> None:
+        self.built, self.site = built, site
         self.folder = AIRCRAFT / aircraft
         known = sorted(p.parent.name for p in AIRCRAFT.glob("*/airframe.toml"))
         if aircraft not in known:
@@ -150,16 +150,20 @@ class Model:
     def place(
         self, height_m: float, euler_rad: tuple[float, float, float], v_b_m_s: Array,
         omega_b_rad_s: tuple[float, float, float], command: ActuatorCommand, air: Air, settle: int,
+        ground_m: float = 0.0,
     ) -> None:  # fmt: skip
         """Restart above the launch point: velocity over the ground in body axes, servos at `command`, mean wind.
+
+        height_m : above the launch point      ground_m : height of the ground there, relative to the launch point
 
         Then the motion is frozen for `settle` steps (at least 1) while the propeller speed settles.
         """
         # Frozen motion is at rest in inertial space: the earth turns below it, up to the launch point.
         ahead_deg = math.degrees(EARTH_RATE_RAD_S * settle * self.dt_s)
-        self.put({"ic/lat-geod-deg": LATITUDE_DEG, "ic/long-gc-deg": LONGITUDE_DEG + ahead_deg})
-        self.put({"ic/terrain-elevation-ft": 0.0})
-        self.put({"ic/h-agl-ft": height_m / FT_TO_M})
+        longitude_deg = float(wrapped_deg(self.site.longitude_deg + ahead_deg))
+        self.put({"ic/lat-geod-deg": self.site.latitude_deg, "ic/long-gc-deg": longitude_deg})
+        self.put({"ic/terrain-elevation-ft": (self.site.elevation_m + ground_m) / FT_TO_M})
+        self.put({"ic/h-agl-ft": (height_m - ground_m) / FT_TO_M})
         self.put(dict(zip(("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"), euler_rad, strict=True)))
         self.put({f"ic/{a}-fps": float(v) / FT_TO_M for a, v in zip("uvw", v_b_m_s, strict=True)})
         self.put({f"ic/{a}-rad_sec": w for a, w in zip("pqr", omega_b_rad_s, strict=True)})
@@ -167,7 +171,7 @@ class Model:
         self.push(np.zeros(3), np.zeros(3))
         self.fdm.run_ic()  # resets commands and wind
         self.put(dict(zip(WRITE, self.built.servos(command)[:4], strict=True)))
-        wind_e = air.mean_wind_e_m_s(height_m)
+        wind_e = air.mean_wind_e_m_s(height_m - ground_m)
         self.put({name: float(w) / FT_TO_M for name, w in zip(WIND, wind_e, strict=True)})
         self.fdm.set_trim_status(True)  # servos jump to their commands
         self.frozen(1)

@@ -13,6 +13,7 @@ from struct import Struct
 import numpy as np
 
 from autopilot.interface import NEUTRAL, ActuatorCommand
+from estimator.blocks.air import true_over_equivalent
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.aeroplane import hand
@@ -25,15 +26,16 @@ from sim.air import STILL, Air, MovingAir
 from sim.clock import Rates
 from sim.faults import Fault
 from sim.log import Log, Outcome, Phase
-from sim.place import LATITUDE_DEG
+from sim.place import LAUNCH_PLACE, Place
 from sim.plant import HandThrow, InFlight, SimulationDiverged, Start
+from sim.terrain import ground_height_m, moved_m
 from sim.truth import earth_rate_e_rad_s, gravity_m_s2, integrate_imu
 
 # Read after each tick: field of the state record, JSBSim properties.
 READ: dict[str, tuple[str, ...]] = {
     "euler_rad": ("attitude/phi-rad", "attitude/theta-rad", "attitude/psi-rad"),
     "omega_b_rad_s": ("velocities/pi-rad_sec", "velocities/qi-rad_sec", "velocities/ri-rad_sec"),
-    "p_neu_ft": ("position/from-start-neu-n-ft", "position/from-start-neu-e-ft", "position/from-start-neu-u-ft"),
+    "place": ("position/lat-geod-rad", "position/long-gc-rad", "position/geod-alt-ft"),
     "v_e_fps": ("velocities/v-north-fps", "velocities/v-east-fps", "velocities/v-down-fps"),
     "wind_e_fps": tuple(f"atmosphere/total-wind-{d}-fps" for d in ("north", "east", "down")),
     "surfaces": ("servo/aileron", "servo/elevator", "servo/rudder", "fcs/throttle-pos-norm"),
@@ -47,7 +49,12 @@ STATE_DTYPE = np.dtype(
         *((name, "f8", (len(properties),)) for name, properties in READ.items()),  # packed into the first bytes
         ("R_eb", "f8", (3, 3)),  # at the end of the previous tick
         ("v_e_m_s", "f8", (3,)),
-        ("origin_e_m", "f8", (3,)),  # of the start, from the launch point
+        ("p_e_m", "f8", (3,)),
+        ("latitude_rad", "f8"),  # there
+        ("longitude_rad", "f8"),
+        ("elevation_m", "f8"),  # of the launch point
+        ("ground_m", "f8"),  # see `sim.place.Place`
+        ("ground_from_m", "f8"),
         ("earth_rate_e", "f8", (3,)),
         ("g_m_s2", "f8"),
         ("dt_s", "f8"),
@@ -101,6 +108,19 @@ def complete(truth, k, state):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def move(s, row):  # type: ignore[no-untyped-def]
+    """Set the position of `row`: the integral of the local velocity, see `sim.place`; down is from the altitude."""
+    altitude_m = FT_TO_M * s.place[2]
+    middle_rad = 0.5 * (s.latitude_rad + s.place[0])
+    north_m, east_m = moved_m(middle_rad, s.place[0] - s.latitude_rad, s.place[1] - s.longitude_rad, altitude_m)
+    row.p_e_m[0], row.p_e_m[1] = s.p_e_m[0] + north_m, s.p_e_m[1] + east_m
+    row.p_e_m[2] = s.elevation_m - altitude_m
+    s.latitude_rad, s.longitude_rad = s.place[0], s.place[1]
+    for i in range(3):
+        s.p_e_m[i] = row.p_e_m[i]
+
+
+@kernel
 def observe(truth, k, state):  # type: ignore[no-untyped-def]
     """Convert the JSBSim state to truth row k, in SI; returns the index of the outcome in OUTCOMES, 0 to continue."""
     row, s = truth[k], state[0]
@@ -110,9 +130,9 @@ def observe(truth, k, state):  # type: ignore[no-untyped-def]
         row.omega_b_rad_s[i] = s.omega_b_rad_s[i]
         row.v_e_m_s[i] = FT_TO_M * s.v_e_fps[i]
         row.wind_e_m_s[i] = FT_TO_M * s.wind_e_fps[i]
-        row.p_e_m[i] = s.origin_e_m[i] + FT_TO_M * s.p_neu_ft[i] * (1.0 if i < 2 else -1.0)
         rate2 += row.omega_b_rad_s[i] ** 2
         speed2 += row.v_e_m_s[i] ** 2
+    move(s, row)
     row.aileron, row.elevator, row.rudder, row.throttle = s.surfaces[0], s.surfaces[1], s.surfaces[2], s.surfaces[3]
     row.phase = 2  # flying
     row.rotor_rpm, row.thrust_n = s.motor[0], LB_TO_N * s.motor[1]
@@ -120,7 +140,7 @@ def observe(truth, k, state):  # type: ignore[no-untyped-def]
     n, e, d = row.p_e_m[0], row.p_e_m[1], row.p_e_m[2]
     if not (rate2 < 1e4 and speed2 < 4e4 and abs(d) < 1e6 and abs(s.euler_rad[0]) < 10.0):  # NaN fails too
         return 3
-    if s.contact[0] != 0.0:
+    if s.contact[0] != 0.0 or (s.ground_m != 0.0 and -d < ground_height_m(n, e, s.ground_m, s.ground_from_m)):
         return 1
     if n * n + e * e > s.box_radius_m**2 or -d > s.box_height_m:
         return 2
@@ -138,6 +158,7 @@ class JsbsimPlant:
     rates : physics and inertial rates
     seed, flight : of the random streams (used here only by turbulence)
     box : limits of the flight; a start outside is rejected
+    place : launch place, and the ground around it
     faults : of surfaces and motor (`sim.aeroplane.actuators`)
     battery : None gives a constant voltage
     built : how the aeroplane differs from its drawing
@@ -147,14 +168,14 @@ class JsbsimPlant:
 
     def __init__(
         self, aircraft: str = "endurance", *, start: Start, air: Air = STILL, rates: Rates | None = None,
-        seed: int = 0, flight: int = 0, box: FlightBox | None = None, faults: Sequence[Fault] = (),
-        battery: BatteryParams | None = None, built: AsBuilt = AS_DRAWN,
+        seed: int = 0, flight: int = 0, box: FlightBox | None = None, place: Place = LAUNCH_PLACE,
+        faults: Sequence[Fault] = (), battery: BatteryParams | None = None, built: AsBuilt = AS_DRAWN,
     ) -> None:  # fmt: skip
         rates = rates or Rates()
         box = box or FlightBox()
         self.start, self.air = start, air
         self.dt_s, self.steps = rates.dt_s, rates.steps_per_tick
-        self._physics_hz, self._aircraft, self._built = rates.physics_hz, aircraft, built
+        self._physics_hz, self._aircraft, self._built, self.place = rates.physics_hz, aircraft, built, place
         self._hold_ticks = self._release_tick = self._hand_ticks = 0
         if isinstance(start, HandThrow):
             hand.check(start)
@@ -165,7 +186,7 @@ class JsbsimPlant:
         self._faults, self._battery = tuple(faults), battery
         self._load()
         span_m = FT_TO_M * float(self.model.get("metrics/bw-ft")[0])
-        self._moving_air = MovingAir(air, span_m, self.dt_s, self.release_s, seed, flight)
+        self._moving_air = MovingAir(air, span_m, self.dt_s, self.release_s, seed, flight, place)
         self._air_moves = not air.is_steady
         self.airframe = self.model.airframe
         self.trimmed = Trim.of(self.airframe["cruise"])
@@ -180,22 +201,26 @@ class JsbsimPlant:
                     f"start {out_m:g} m out and {start.height_m:g} m high: must be inside the flight box, "
                     f"box_radius_m {box.radius_m:g} m and box_height_m {box.height_m:g} m"
                 )
-            airspeed_m_s = self.trimmed.airspeed_m_s if start.airspeed_m_s is None else start.airspeed_m_s
+            airspeed_m_s = start.airspeed_m_s
+            if airspeed_m_s is None:  # the same pressure on the wing
+                airspeed_m_s = self.trimmed.airspeed_m_s * true_over_equivalent(place.elevation_m)
             self.trimmed = trim(self.model, airspeed_m_s, start.height_m, heading_rad=start.heading_rad)
         self._state = np.zeros(1, STATE_DTYPE)
         self._buffer = self._state.data
-        latitude_rad = math.radians(LATITUDE_DEG)
         s = self._state[0]
-        s["earth_rate_e"], s["g_m_s2"] = earth_rate_e_rad_s(latitude_rad), gravity_m_s2(latitude_rad)
+        s["earth_rate_e"] = earth_rate_e_rad_s(place.latitude_rad)
+        s["g_m_s2"] = gravity_m_s2(place.latitude_rad, place.elevation_m)
+        s["elevation_m"], s["ground_m"], s["ground_from_m"] = place.elevation_m, place.ground_m, place.ground_from_m
         s["dt_s"], s["box_radius_m"], s["box_height_m"] = self.dt_s, box.radius_m, box.height_m
 
     def _load(self) -> None:
         """A new JSBSim for each flight: a diverged state survives any reset."""
-        self.model = Model(self._aircraft, self._physics_hz, self._built)
+        self.model = Model(self._aircraft, self._physics_hz, self._built, self.place)
         self._getters = [self.model.getter(p) for properties in READ.values() for p in properties]
         self._aileron, self._elevator, self._rudder, self._throttle = self.model.servo_setters()
         self._wind = tuple(self.model.setter(p) for p in WIND)
         self._air_rates = tuple(self.model.setter(p) for p in AIR_RATES if self.model.has(p))
+        self._terrain = self.model.setter("position/terrain-elevation-asl-ft")
         self._pack = Struct(f"{len(self._getters)}d").pack_into
         self.actuators: Actuators | None = None
         if self._faults or self._battery is not None:
@@ -239,15 +264,16 @@ class JsbsimPlant:
         rotation_of(*euler_rad, s["R_eb"])
         s["v_e_m_s"] = s["R_eb"] @ v_b_m_s
         settle = max(1, round(settle_s / self.model.dt_s))
-        self.model.place(-p_e_m[2], euler_rad, v_b_m_s, omega_b_rad_s, command, self.air, settle)
+        ground_m = self.place.ground_at_m(p_e_m[0], p_e_m[1])
+        self.model.place(-p_e_m[2], euler_rad, v_b_m_s, omega_b_rad_s, command, self.air, settle, ground_m)
         self._anchor(p_e_m)
         if self._air_moves:
             self._blow(*self._moving_air.now)
 
     def _anchor(self, p_e_m: tuple[float, float, float]) -> None:
         """Define the current position of JSBSim as `p_e_m`."""
-        n, e, u = FT_TO_M * self.model.get(*READ["p_neu_ft"])
-        self._state[0]["origin_e_m"] = np.array(p_e_m) - np.array([n, e, -u])
+        s = self._state[0]
+        s["p_e_m"], (s["latitude_rad"], s["longitude_rad"], _) = p_e_m, self.model.get(*READ["place"])
 
     def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:
         """Fly tick `k` with `command` and fill truth row k; an Outcome if the flight ended in it."""
@@ -256,6 +282,8 @@ class JsbsimPlant:
         if k < self._hand_ticks:
             return self._in_hand(k, command)
         self._command(k, command)
+        if self.place.ground_m:
+            self._raise_ground()
         run = self.model.run
         try:
             for _ in range(self.steps):
@@ -270,6 +298,12 @@ class JsbsimPlant:
             write(speed_m_s / FT_TO_M)
         for write, rate_rad_s in zip(self._air_rates, air[3:], strict=False):  # optional in a model
             write(rate_rad_s)
+
+    def _raise_ground(self) -> None:
+        """Put the ground of JSBSim at its height below the aeroplane, where that does not reach it."""
+        north_m, east_m, down_m = self._state[0]["p_e_m"].tolist()
+        ground_m = min(self.place.ground_at_m(north_m, east_m), -down_m)
+        self._terrain((self.place.elevation_m + ground_m) / FT_TO_M)
 
     def _command(self, k: int, command: Sequence[float]) -> None:
         if self.actuators is not None:

@@ -11,7 +11,9 @@ from sim.air import dryden
 from sim.air.gust import Gust, add_gusts
 from sim.air.profile import share_of_wind
 from sim.air.thermal import Thermals, updraft_m_s
+from sim.place import LAUNCH_PLACE, Place
 from sim.rng import stream
+from sim.terrain import ground_height_m
 
 AIR_DTYPE = np.dtype(
     [
@@ -23,6 +25,8 @@ AIR_DTYPE = np.dtype(
         ("inversion_m", "f8"),
         ("thermal_area_m2", "f8"),
         ("p_e_m", "f8", (3,)),  # of the aeroplane
+        ("ground_m", "f8"),  # see `sim.place.Place`
+        ("ground_from_m", "f8"),
         ("airspeed_m_s", "f8"),
         *dryden.FIELDS,
         ("now", "f8", (6,)),  # wind_e_m_s there, and rates of the air, rate_b_rad_s
@@ -80,15 +84,20 @@ class MovingAir:
     span_m : of the aeroplane, over which turbulence is averaged for its rates
     dt_s : tick          release_s : since power-up; gust times count from it
     seed, flight : of the random streams: turbulence u, v (and r), w (and q), p
+    place : the heights of profile, turbulence and thermals are above its ground
 
     Gusts, thermals and shear draw no random numbers and leave the turbulence unchanged.
     """
 
-    def __init__(self, air: Air, span_m: float, dt_s: float, release_s: float, seed: int, flight: int = 0) -> None:
+    def __init__(
+        self, air: Air, span_m: float, dt_s: float, release_s: float, seed: int, flight: int = 0,
+        place: Place = LAUNCH_PLACE,
+    ) -> None:  # fmt: skip
         self.air, self._seed, self._flight = air, seed, flight
         self.state = np.zeros(1, AIR_DTYPE)
         self._now = self.state["now"][0]
         s, thermals = self.state[0], air.thermals
+        s["ground_m"], s["ground_from_m"] = place.ground_m, place.ground_from_m
         s["dt_s"], s["release_s"], s["span_m"] = dt_s, release_s, span_m
         s["wind_e_m_s"], s["shear"], s["w20_m_s"] = air.wind_e_m_s, air.shear, air.turbulence_w20_m_s
         north, east, _ = air.wind_e_m_s
@@ -136,6 +145,8 @@ class MovingAir:
 def _gather(t_s, distance_m, z, s, gusts, places):  # type: ignore[no-untyped-def]
     """Write wind and rates at ``s.p_e_m`` into ``s.now``, `distance_m` further through the air, at `t_s`."""
     height_m = -s.p_e_m[2]
+    if s.ground_m != 0.0:
+        height_m -= ground_height_m(s.p_e_m[0], s.p_e_m[1], s.ground_m, s.ground_from_m)
     wind_e, rate_b = s.now[:3], s.now[3:]
     share = share_of_wind(height_m, s.shear)
     for i in range(3):

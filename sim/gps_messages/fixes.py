@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
-import pymap3d
 from numpy.typing import NDArray
 
+from sim import place as place_of
 from sim.place import ELEVATION_M, LATITUDE_DEG, LONGITUDE_DEG, YEAR
 from sim.recording import replacing
 
@@ -204,7 +204,7 @@ def checked(place: Place) -> Place:
 
 
 def geodetic(p_e_m: Array, place: Place) -> Array:
-    """Latitude, longitude (deg) and height (m) of positions of shape (n, 3).
+    """Latitude, longitude (deg) and height (m) of positions of shape (n, 3), by the convention of `sim.place`.
 
     If down is NaN, so is the height, and the rest is computed at the level of the place; if north or east is, all are.
     """
@@ -213,7 +213,7 @@ def geodetic(p_e_m: Array, place: Place) -> Array:
     if known.any():
         n_m, e_m, d_m = p_e_m[known].T
         d_m = np.where(np.isfinite(d_m), d_m, 0.0)
-        there[known] = np.transpose(pymap3d.ned2geodetic(n_m, e_m, d_m, *checked(place)))
+        there[known] = place_of.geodetic(np.column_stack((n_m, e_m, d_m)), *checked(place))
     there[~np.isfinite(p_e_m[:, 2]), 2] = NAN
     return there
 
@@ -294,7 +294,7 @@ def _fixes(times: list[int], ordered: list[Epoch], place: Place, zero_ns: int) -
     latitude_deg, longitude_deg, height_m = np.array([(e.latitude_deg, e.longitude_deg, e.height_m) for e in ordered]).T
     known = np.isfinite(height_m)
     near_m = np.where(known, height_m, place.height_m)  # north and east hardly depend on it
-    p_e_m = np.transpose(pymap3d.geodetic2ned(latitude_deg, longitude_deg, near_m, *place))
+    p_e_m = place_of.local(latitude_deg, longitude_deg, near_m, *place)
     p_e_m[~known, 2] = NAN
     horizontal, vertical, speed, course = np.array([e.accuracy for e in ordered]).T
     return Fixes(

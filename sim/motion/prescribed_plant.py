@@ -267,7 +267,9 @@ class Loop:
         )
 
 
-def inertial_rate_and_force(motion: Motion, t_s: Array, latitude_rad: float) -> tuple[Array, Array]:
+def inertial_rate_and_force(
+    motion: Motion, t_s: Array, latitude_rad: float, elevation_m: float = 0.0
+) -> tuple[Array, Array]:
     """What perfect sensors at the centre of gravity measure at the times `t_s`, shape (n,).
 
     Returns
@@ -276,23 +278,24 @@ def inertial_rate_and_force(motion: Motion, t_s: Array, latitude_rad: float) -> 
     """
     at = motion.at(t_s)
     earth_e = earth_rate_e_rad_s(latitude_rad)
-    g_e = np.array([0.0, 0.0, gravity_m_s2(latitude_rad)])
+    g_e = np.array([0.0, 0.0, gravity_m_s2(latitude_rad, elevation_m)])
     R_be = np.swapaxes(at.R_eb, 1, 2)
     force_e = at.a_e_m_s2 + 2.0 * np.cross(earth_e, at.v_e_m_s) - g_e
     return at.omega_b_rad_s + R_be @ earth_e, np.einsum("nij,nj->ni", R_be, force_e)
 
 
-def motion_rows(motion: Motion, n_ticks: int, dt_s: float, latitude_rad: float) -> Array:
+def motion_rows(motion: Motion, n_ticks: int, dt_s: float, latitude_rad: float, elevation_m: float = 0.0) -> Array:
     """The truth of `n_ticks` ticks of `motion`, shape (n_ticks,) of TRUTH; sensor columns stay zero."""
     rows = np.zeros(n_ticks, TRUTH_DTYPE)
     t_s: Array = np.arange(1, n_ticks + 1) * np.float64(dt_s)
     rows["t_s"] = t_s
     at = motion.at(t_s)
     rows["R_eb"], rows["p_e_m"], rows["v_e_m_s"] = at.R_eb, at.p_e_m, at.v_e_m_s
-    rows["omega_b_rad_s"], _ = inertial_rate_and_force(motion, t_s, latitude_rad)
+    rows["omega_b_rad_s"], _ = inertial_rate_and_force(motion, t_s, latitude_rad, elevation_m)
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     for node, weight in zip(nodes, 0.5 * weights, strict=True):
-        omega_b, force_b = inertial_rate_and_force(motion, t_s + 0.5 * dt_s * (float(node) - 1.0), latitude_rad)
+        within_s = t_s + 0.5 * dt_s * (float(node) - 1.0)
+        omega_b, force_b = inertial_rate_and_force(motion, within_s, latitude_rad, elevation_m)
         rows["imu_omega_b_rad_s"] += weight * omega_b
         rows["imu_force_b_m_s2"] += weight * force_b
     rows["wind_e_m_s"] = getattr(motion, "wind_e_m_s", CALM)
@@ -312,20 +315,25 @@ class PrescribedPlant:
     """
 
     def __init__(
-        self, motion: Motion, rates: Rates, latitude_deg: float = LATITUDE_DEG, release_s: float = 0.0
+        self,
+        motion: Motion,
+        rates: Rates,
+        latitude_deg: float = LATITUDE_DEG,
+        release_s: float = 0.0,
+        elevation_m: float = 0.0,
     ) -> None:
         if not abs(latitude_deg) <= 90.0:
             raise ValueError(f"latitude_deg = {latitude_deg!r} deg: choose a latitude from -90 to 90 deg")
         self.motion = motion
         self.dt_s = rates.dt_s
         self.release_s = release_s
-        self.latitude_deg = latitude_deg
+        self.latitude_deg, self.elevation_m = latitude_deg, elevation_m
         self._truth = self._rows = np.zeros(0, TRUTH_DTYPE)
 
     def reset(self, log: Log) -> None:
         """Compute the motion for the length of `log`."""
         self._truth = log.truth
-        self._rows = motion_rows(self.motion, len(log), self.dt_s, math.radians(self.latitude_deg))
+        self._rows = motion_rows(self.motion, len(log), self.dt_s, math.radians(self.latitude_deg), self.elevation_m)
 
     def advance(self, k: int, command: ActuatorCommand) -> Outcome | None:  # noqa: ARG002 - commands are ignored
         """Fill truth row `k`; never ends the flight."""

@@ -1,15 +1,18 @@
 """Air data: airspeed from a pitot tube with its pressure sensor, and height from a barometer.
 
-Airspeed from the pitot pressure q, V = sqrt(2 q / rho); compressibility (0.1 % at 20 m/s) is neglected:
+Equivalent airspeed from the pitot pressure q, EAS = sqrt(2 q / rho_0) with the density rho_0 of the standard atmosphere
+at sea level; compressibility (0.1 % at 20 m/s) is neglected:
 
     q = convert((1 + gain) rho V^2 / 2 + offset + noise)
 
+with the density rho of the standard atmosphere at the height of the aeroplane above the sea (`estimator.blocks.air`):
+EAS is 0.953 of the true airspeed V at 1,000 m, 0.866 at 2,900 m.
+
 Height from the pressure of the standard atmosphere (ISO 2533, troposphere), after a first-order lag:
 
-    p = p0 (1 - L h / T0)^(g0 / R L) + drift + wander + noise
+    p = p0 (1 - L h / T0)^(g0 / R L) + drift D (1 - exp(-t / D)) + wander + noise
 
-Density and pressure at the launch point are standard and known to the firmware, which uses the density of the launch
-point at every height (half a percent of airspeed per 100 m).
+The pressure at the launch point is standard and known to the firmware.
 
 Sample j of each is valid at physics step j * steps_per_sample (interpolated between two ticks) and arrives in the
 first tick that ends at that time or later.
@@ -17,30 +20,23 @@ first tick that ends at that time or later.
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.blocks.air import DENSITY_KG_M3, EXPONENT, LAPSE_K_M, PRESSURE_PA, TEMPERATURE_K, density_ratio
 from estimator.compiler.jit import kernel
-from estimator.interface import G_M_S2
-from sim import place
 from sim.clock import Rates
+from sim.place import LAUNCH_PLACE, Place
 from sim.sensors.noise import (
     Source,
     gauss_markov,
     lag_weights,
+    levelling_off,
     require,
     require_scale,
     to_step,
 )
-
-# ISO 2533: at sea level, and the lapse rate.
-PRESSURE_PA: Final = 101325.0
-TEMPERATURE_K: Final = 288.15
-LAPSE_K_M: Final = 0.0065
-GAS_CONSTANT_J_KG_K: Final = 287.05287
-_EXPONENT: Final = G_M_S2 / (GAS_CONSTANT_J_KG_K * LAPSE_K_M)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +77,9 @@ class BarometerParams:
     rate_hz : sample rate, which must divide the physics rate (Hz, default 10).  Higher: fresher height
     lag_s : time constant of the lag of the height (s, default 0)
     noise_pa : sigma of each sample (Pa, default 0)
-    drift_pa_min : sigma of the steady drift with weather and temperature (Pa per minute, default 0)
+    drift_pa_min : sigma of the drift with weather and temperature at power-up (Pa per minute, default 0)
+    drift_s : time constant with which that levels off (s, default 36000, an assumption: 1 Pa per minute, or 1.8 hPa in
+        three hours, then ends at 6 hPa, as the weather of a season scatters).  Higher: it goes on for longer
     wander_pa : sigma of the correlated error (Pa, default 0)
     wander_s : correlation time of that error (s, default 30).  Higher: averages out more slowly
     range_pa : full scale, from 0 (Pa, default inf: none).  Below the pressure on the ground: saturates there
@@ -92,6 +90,7 @@ class BarometerParams:
     lag_s: float = 0.0
     noise_pa: float = 0.0
     drift_pa_min: float = 0.0
+    drift_s: float = 36000.0
     wander_pa: float = 0.0
     wander_s: float = 30.0
     range_pa: float = math.inf
@@ -100,7 +99,7 @@ class BarometerParams:
     def __post_init__(self) -> None:
         require(self, "rate_hz", least=0.1)
         require(self, "lag_s", "noise_pa", "wander_pa", "drift_pa_min")
-        require(self, "wander_s", least=0.001)
+        require(self, "wander_s", "drift_s", least=0.001)
         require_scale(self, "range_pa", "step_pa")
 
 
@@ -110,7 +109,7 @@ UNIT = np.dtype(
         ("steps_per_tick", "i8"),
         ("airspeed_steps", "i8"),  # physics steps between samples; 0: not fitted
         ("baro_steps", "i8"),
-        ("density_kg_m3", "f8"),
+        ("elevation_m", "f8"),
         ("gain", "f8"),
         ("offset_pa", "f8"),
         ("axial", "i8"),
@@ -128,22 +127,15 @@ MEMORY = np.dtype([("height_m", "f8"), ("height_was_m", "f8")], align=True)  # l
 NOISE = (("airspeed_noise_pa", "f8"), ("baro_error_pa", "f8"))
 
 
-def density_kg_m3(height_m: float) -> float:
-    """Density of the standard atmosphere at `height_m` above the sea."""
-    temperature_k = TEMPERATURE_K - LAPSE_K_M * height_m
-    return float(_pressure_pa(height_m)) / (GAS_CONSTANT_J_KG_K * temperature_k)
-
-
 def make(
     airspeed: AirspeedParams | None, barometer: BarometerParams | None, rates: Rates, source: Source,
-    unit: NDArray[np.void],
+    unit: NDArray[np.void], place: Place = LAUNCH_PLACE,
 ) -> None:  # fmt: skip
     """Make both: draw the errors of the flight, set their constants in `unit`, shape (1,) of UNIT."""
-    unit["fitted"] = 1
+    unit["fitted"], unit["elevation_m"] = 1, place.elevation_m
     unit["steps_per_tick"] = rates.steps_per_tick
     if airspeed is not None:
         unit["airspeed_steps"] = rates.steps_per_sample("airspeed", airspeed.rate_hz)
-        unit["density_kg_m3"] = density_kg_m3(place.ELEVATION_M)
         unit["gain"] = 1.0 + airspeed.gain * source("airspeed gain").standard_normal()
         unit["offset_pa"] = airspeed.offset_pa * source("airspeed offset").standard_normal()
         unit["axial"] = airspeed.axial
@@ -169,7 +161,7 @@ def draw(
         error_pa += barometer.noise_pa * source("barometer noise").standard_normal(n)
     if barometer.drift_pa_min > 0.0:
         rate_pa_s = barometer.drift_pa_min / 60.0 * source("barometer drift").standard_normal()
-        error_pa += rate_pa_s * rates.dt_s * np.arange(1, n + 1)
+        error_pa += rate_pa_s * levelling_off(rates.dt_s * np.arange(1.0, n + 1.0), barometer.drift_s)
     if barometer.wander_pa > 0.0:
         steps = source("barometer wander").standard_normal((n, 1))
         error_pa += gauss_markov(steps, np.array([barometer.wander_pa]), barometer.wander_s, rates.dt_s)[:, 0]
@@ -188,7 +180,8 @@ def measure_air(truth, measured, noise, k, unit, memory):  # type: ignore[no-unt
         if step > k * spt:
             late = (step - k * spt) / spt  # fraction of the tick, 0 < late <= 1
             speed = (1.0 - late) * _felt_m_s(older, unit) + late * _felt_m_s(newer, unit)
-            row.equivalent_airspeed_m_s = _airspeed_m_s(speed, noise[k].airspeed_noise_pa, unit)
+            ratio = density_ratio(unit.elevation_m - newer.p_e_m[2])
+            row.equivalent_airspeed_m_s = _airspeed_m_s(speed, ratio, noise[k].airspeed_noise_pa, unit)
             row.air_new = 1
     if unit.baro_steps:
         _lag(-older.p_e_m[2], -newer.p_e_m[2], k, unit, memory)
@@ -207,11 +200,11 @@ def _felt_m_s(row, unit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _airspeed_m_s(speed_m_s, noise_pa, unit):  # type: ignore[no-untyped-def]
-    """Reading at the airspeed `speed_m_s`; a negative pressure reads as zero."""
-    sensed = unit.gain * 0.5 * unit.density_kg_m3 * speed_m_s * abs(speed_m_s) + unit.offset_pa + noise_pa
+def _airspeed_m_s(speed_m_s, ratio, noise_pa, unit):  # type: ignore[no-untyped-def]
+    """Reading at the true airspeed `speed_m_s` in air of a density `ratio`; a negative pressure reads as zero."""
+    sensed = unit.gain * 0.5 * DENSITY_KG_M3 * ratio * speed_m_s * abs(speed_m_s) + unit.offset_pa + noise_pa
     pressure = to_step(min(max(sensed, -unit.range_pa), unit.range_pa), unit.airspeed_step_pa)
-    return np.sqrt(2.0 * max(pressure, 0.0) / unit.density_kg_m3)
+    return np.sqrt(2.0 * max(pressure, 0.0) / DENSITY_KG_M3)
 
 
 @kernel
@@ -219,20 +212,20 @@ def _height_m(height_m, error_pa, unit):  # type: ignore[no-untyped-def]
     """Reading at the height `height_m` above the launch point."""
     if error_pa == 0.0 and unit.baro_step_pa == 0.0 and np.isinf(unit.baro_range_pa):
         return height_m  # converting to pressure and back would cost digits
-    pressure = min(max(_pressure_pa(place.ELEVATION_M + height_m) + error_pa, 0.0), unit.baro_range_pa)
-    return height_at_m(to_step(pressure, unit.baro_step_pa))
+    pressure = min(max(_pressure_pa(unit.elevation_m + height_m) + error_pa, 0.0), unit.baro_range_pa)
+    return height_at_m(to_step(pressure, unit.baro_step_pa), unit.elevation_m)
 
 
 @kernel
-def height_at_m(pressure_pa):  # type: ignore[no-untyped-def]
-    """Height above the launch point of this pressure in the standard atmosphere."""
-    return TEMPERATURE_K / LAPSE_K_M * (1.0 - (pressure_pa / PRESSURE_PA) ** (1.0 / _EXPONENT)) - place.ELEVATION_M
+def height_at_m(pressure_pa, elevation_m):  # type: ignore[no-untyped-def]
+    """Height above a launch point at `elevation_m` of this pressure in the standard atmosphere."""
+    return TEMPERATURE_K / LAPSE_K_M * (1.0 - (pressure_pa / PRESSURE_PA) ** (1.0 / EXPONENT)) - elevation_m
 
 
 @kernel
 def _pressure_pa(height_m):  # type: ignore[no-untyped-def]
     """Pressure of the standard atmosphere, ISO 2533, up to 11 km above the sea."""
-    return PRESSURE_PA * (1.0 - LAPSE_K_M * height_m / TEMPERATURE_K) ** _EXPONENT
+    return PRESSURE_PA * (1.0 - LAPSE_K_M * height_m / TEMPERATURE_K) ** EXPONENT
 
 
 @kernel

@@ -15,6 +15,7 @@ STILL: Triple = (0.0, 0.0, 0.0)
 LONGEST_REST_S = 600.0  # all of it is simulated and held in memory
 MOST_SUPPLY_ERROR = 0.1  # five sigma and the largest sag leave the supply above zero
 MOST_SUPPLY_SAG = 0.4
+MOST_JITTER = 0.4  # the shortest intervals are then next to nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +32,13 @@ class BoardParams:
     rest_s : time the firmware averages the sensors, level on the ground, before a flight that starts in the air; a
         throw is calibrated in the hand (s, default 0: not at all).  Higher: the turn-on bias is known better
     warming_k : how much warmer the parts end up than at power-up (K, default 0)
-    warming_s : time constant of the warm-up (s, default 300).  Lower: biases change faster after power-up
+    warming_s : time constant of the warm-up, and of a gyro's drift with it (s, default 300).  Lower: biases change
+        sooner after power-up, and a drift ends sooner and smaller
     vibration_g, vibration_deg_s : amplitude per axis at the motor speed `vibration_rpm`, once per revolution; it
         grows with the square of the speed, as of an unbalanced rotor (g and deg/s, default 0)
     vibration_rpm : motor speed at which those amplitudes hold (rpm, default 8000).  Higher: less at the same speed
+    dt_jitter : sigma of the length of the interval of an inertial sample, as a loop jitters; see `sim.sensors.sampling`
+        (fraction of the nominal length, default 0).  Higher: less even, and older samples
     """
 
     lever_arm_b_m: Triple = STILL
@@ -48,6 +52,7 @@ class BoardParams:
     vibration_g: float = 0.0
     vibration_deg_s: float = 0.0
     vibration_rpm: float = 8000.0
+    dt_jitter: float = 0.0
 
     def __post_init__(self) -> None:
         require(self, "supply_tolerance", most=MOST_SUPPLY_ERROR)
@@ -57,6 +62,7 @@ class BoardParams:
         require(self, "warming_k", "vibration_g", "vibration_deg_s")
         require(self, "warming_s", least=0.001)
         require(self, "vibration_rpm", least=1.0)
+        require(self, "dt_jitter", most=MOST_JITTER)
 
     def supply_power(self, output: Output) -> int:
         """Power of the relative supply voltage by which the reading of a part with this `output` is multiplied."""

@@ -28,7 +28,7 @@ from estimator.interface import Array
 from estimator.rotation import from_euler
 from sim.clock import Rates
 from sim.sensors.board import BoardParams, warming
-from sim.sensors.noise import FLICKER_TIMES_S, Source, flicker, random_walk, sample_sigma
+from sim.sensors.noise import FLICKER_TIMES_S, Source, flicker, levelling_off, random_walk, sample_sigma
 
 # In SI units of the reading.  A flag per group, so that effects which are off cost no time.
 DEVICE: tuple[Any, ...] = (
@@ -195,7 +195,8 @@ def draw(figures: Figures, board: BoardParams, rates: Rates, source: Source, noi
     if figures.bias:
         bias = bias + figures.bias * source(f"{name} bias").standard_normal(3)
     if figures.drift_per_s:
-        bias = bias + figures.drift_per_s * source(f"{name} drift").standard_normal(3) * t_s
+        slope = figures.drift_per_s * source(f"{name} drift").standard_normal(3)
+        bias = bias + slope * levelling_off(t_s, board.warming_s)
     if figures.bias_per_k and board.warming_k:
         slope = figures.bias_per_k * source(f"{name} bias per kelvin").standard_normal(3)
         bias = bias + slope * warming(board, t_s)

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.blocks.air import DENSITY_KG_M3
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, Array
 from sim import params
@@ -210,9 +211,10 @@ def _span(part: str, unit: np.void) -> tuple[float, float, float, float]:
         if unit[part]["overflow"]:
             return least, most, count * float(unit[part]["overflow"]), count * float(unit[part]["overflow"])
     elif part == "airspeed":
-        least, most = 0.0, math.sqrt(2.0 * float(unit["air"]["range_pa"]) / float(unit["air"]["density_kg_m3"]))
+        least, most = 0.0, math.sqrt(2.0 * float(unit["air"]["range_pa"]) / DENSITY_KG_M3)
     elif part == "barometer" and math.isfinite(unit["air"]["baro_range_pa"]):
-        least, most = height_at_m(float(unit["air"]["baro_range_pa"])), height_at_m(0.0)
+        elevation_m = float(unit["air"]["elevation_m"])
+        least, most = (height_at_m(pa, elevation_m) for pa in (float(unit["air"]["baro_range_pa"]), 0.0))
     return least, most, least, most
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from sim.clock import Rates
-from sim.place import metres_per_degree
+from sim.place import LAUNCH_PLACE, Place, metres_per_degree
 from sim.sensors.noise import Source, gauss_markov, lag_weights, require, require_choice, require_positive
 
 Resolution = Literal["none", "nmea", "binary"]
@@ -130,7 +130,7 @@ def _whole_steps(time_s: float, physics_hz: int) -> int:
     return math.ceil(time_s * physics_hz - 1e-9)
 
 
-def make(params: GpsParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
+def make(params: GpsParams, rates: Rates, source: Source, unit: NDArray[np.void], place: Place = LAUNCH_PLACE) -> None:
     """Make one receiver: set its constants in `unit`, shape (1,) of UNIT."""
     unit["filter_s"] = params.filter_s
     unit["before"], unit["start"], unit["end"] = lag_weights(params.filter_s, rates.dt_s)
@@ -143,7 +143,7 @@ def make(params: GpsParams, rates: Rates, source: Source, unit: NDArray[np.void]
     unit["first_fix_step"] = _whole_steps(first_fix_s, rates.physics_hz)
     unit["smoothing_s"], unit["hold_below_m_s"] = params.smoothing_s, params.hold_below_m_s
     unit["from_positions"] = params.course == "positions"
-    _set_resolution(params, unit)
+    _set_resolution(params, unit, place)
     unit["plain"] = (
         params.resolution == "none"
         and params.course == "velocity"
@@ -151,14 +151,14 @@ def make(params: GpsParams, rates: Rates, source: Source, unit: NDArray[np.void]
     )
 
 
-def _set_resolution(params: GpsParams, unit: NDArray[np.void]) -> None:
+def _set_resolution(params: GpsParams, unit: NDArray[np.void], place: Place) -> None:
     """Set in `unit` the steps of the messages' fields.
 
     NMEA 0183: ddmm.mmmm (or mmmmm), 0.1 m, 0.01 knot, 0.01 deg.  UBX NAV-PVT: 1e-7 deg, 1 mm, 1 mm/s, 1e-5 deg.
     """
     if params.resolution == "none":
         return
-    north_m, east_m = metres_per_degree()
+    north_m, east_m = metres_per_degree(place.latitude_deg, place.elevation_m)
     nmea = params.resolution == "nmea"
     angle_deg = 10.0**-params.minute_decimals / 60.0 if nmea else 1e-7
     unit["p_step_m"] = angle_deg * north_m, angle_deg * east_m, 0.1 if nmea else 0.001

@@ -1,11 +1,16 @@
 """Rate gyro: turn-on bias, drift, random walk, noise, gain and cross-axis errors, saturation, quantisation.
 
 reading = convert(supply(curve(M omega + G f) + bias(t) + noise)),   M = (1 + diag(gain) + cross-axis) R_sb,
-bias(t) = turn-on + drift t + slope x warming(t) + flicker noise + random walk
+bias(t) = turn-on + drift T (1 - exp(-t / T)) + slope x warming(t) + flicker noise + random walk
 
 `omega` is the mean inertial rate over the tick, `f` the mean specific force at the board, vibration excluded.
-bias(t), which an estimator can learn, is recorded in the truth.  Terms are those of IEEE Std 952 (rate ramp, bias
-instability, rate random walk, angle random walk).
+bias(t), which an estimator can learn, is recorded in the truth.  Terms are those of IEEE Std 952 (bias instability,
+rate random walk, angle random walk); its rate ramp is the start of the drift, which levels off with the time constant
+T of the board, because what drives it is the part's own warming.
+
+Of the default, 0.2 deg/s per minute and T = 300 s, 1 deg/s is left in the end.  Analogue gyros change by about 0.1
+deg/s per kelvin (the ADXRS401 and LISY300AL of `parts`, there "typical"), so that this is a warming by 10 K.  The
+warming and T are assumptions: boards like these end up 8 to 20 K above the air, within a quarter of an hour.
 """
 
 import math
@@ -33,7 +38,8 @@ class GyroParams:
     bias_deg_s : sigma of the turn-on bias, constant in a flight (deg/s, default 1)
     bias_per_k_deg_s : sigma of the bias change with temperature (deg/s per kelvin, default 0)
     bias_instability_deg_s : flicker noise, coefficient B of IEEE Std 952; Allan deviation 0.664 B (deg/s, default 0)
-    drift_deg_s_min : sigma of the steady bias ramp (deg/s per minute, default 0.2)
+    drift_deg_s_min : sigma of the bias drift per minute at power-up; it levels off with `board.warming_s`, at that
+        many minutes of it: 1 deg/s (deg/s per minute, default 0.2)
     walk_deg_s_sqrt_s : rate random walk, sigma of the bias after 1 s (deg/s per root second, default 0.01)
     noise_density_deg_s_sqrt_hz : one-sided white noise density, as in data sheets (deg/s per root Hz, default 0.06)
     gain : sigma of the relative gain error (fraction, default 0.015)

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from estimator.compiler.jit import kernel
 from estimator.interface import Array
 from estimator.rotation import from_euler
-from sim import place
 from sim.clock import Rates
 from sim.magnetic_field import field_e_ut, require_year
+from sim.place import LAUNCH_PLACE, YEAR, Place
 from sim.sensors.board import Triple
 from sim.sensors.noise import Source, require, require_scale, require_triple
 
@@ -69,7 +69,7 @@ class MagnetometerParams:
     range_ut: float = math.inf
     step_ut: float = 0.0
     overflow: int = 0
-    year: float = place.YEAR
+    year: float = YEAR
 
     def __post_init__(self) -> None:
         require(self, "rate_hz", least=0.1)
@@ -112,13 +112,15 @@ def _symmetric(sigma: float, normal: Array) -> Array:
     return np.eye(3) + sigma * (lower + np.tril(lower, -1).T)
 
 
-def make(params: MagnetometerParams, rates: Rates, source: Source, unit: NDArray[np.void]) -> None:
+def make(
+    params: MagnetometerParams, rates: Rates, source: Source, unit: NDArray[np.void], place: Place = LAUNCH_PLACE
+) -> None:
     """Make one magnetometer: draw iron, gains and cross axes, set its constants in `unit`, shape (1,) of UNIT."""
     unit["fitted"] = 1
     unit["steps_per_tick"] = rates.steps_per_tick
     unit["steps_per_sample"] = rates.steps_per_sample("magnetometer", params.rate_hz)
     unit["latency_steps"] = math.ceil(params.latency_s * rates.physics_hz - 1e-9)  # less than a nanostep is round-off
-    unit["field_e_ut"] = field_e_ut(place.LATITUDE_DEG, place.LONGITUDE_DEG, place.ELEVATION_M, params.year)
+    unit["field_e_ut"] = field_e_ut(place.latitude_deg, place.longitude_deg, place.elevation_m, params.year)
     soft = _symmetric(params.soft_iron, source("magnetometer soft iron").standard_normal((3, 3)))
     hard_b_ut = params.hard_iron_b_ut + params.hard_iron_ut * source("magnetometer hard iron").standard_normal(3)
     M = params.cross_axis * source("magnetometer cross axis").standard_normal((3, 3))

@@ -135,6 +135,14 @@ def _recur(x, phi):  # type: ignore[no-untyped-def]
             x[k, i] = phi * x[k - 1, i] + fresh * x[k, i]
 
 
+def levelling_off(t_s: Array, time_constant_s: float) -> Array:
+    """Time for which a drift has acted at its first rate, s: it begins as `t_s` and levels off at the time constant.
+
+    The step response of a first-order lag, T (1 - exp(-t / T)), as of a body that warms up by Newton's law of cooling.
+    """
+    return np.asarray(-time_constant_s * np.expm1(-t_s / time_constant_s))
+
+
 def lag_weights(time_constant_s: float, dt_s: float) -> tuple[float, float, float]:
     """Weights of a first-order lag over a tick: of its output at the start, and of its input at start and end.
 

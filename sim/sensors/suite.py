@@ -15,8 +15,9 @@ from estimator.interface import MEASURED_DTYPE, Measurements
 from sim.clock import Rates
 from sim.faults import Fault
 from sim.log import TRUTH_DTYPE, Log
+from sim.place import LAUNCH_PLACE, Place
 from sim.rng import stream
-from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver
+from sim.sensors import accelerometer, air_data, board, gps, gyro, magnetometer, receiver, sampling
 from sim.sensors.accelerometer import measure_force
 from sim.sensors.air_data import measure_air
 from sim.sensors.board import attend
@@ -26,6 +27,7 @@ from sim.sensors.fitting import SuiteParams as SuiteParams
 from sim.sensors.gyro import measure_rate
 from sim.sensors.magnetometer import measure_field
 from sim.sensors.receiver import receive
+from sim.sensors.sampling import EVERY_TICK, samples_of, take_sample
 
 UNIT = np.dtype(
     [
@@ -38,7 +40,7 @@ NOISE = np.dtype([*gyro.NOISE, *accelerometer.NOISE, *gps.NOISE, *magnetometer.N
 MEMORY = np.dtype(
     [
         ("board", board.MEMORY), ("gyro", gyro.MEMORY), ("accelerometer", accelerometer.MEMORY),
-        ("gps", receiver.MEMORY), ("air", air_data.MEMORY),
+        ("gps", receiver.MEMORY), ("air", air_data.MEMORY), ("imu", sampling.MEMORY),
     ],
     align=True,
 )  # fmt: skip
@@ -51,26 +53,30 @@ class Snapshot(NamedTuple):
     noise: NDArray[np.void]
     memory: NDArray[np.void]
     faults: NDArray[np.void]
+    samples: NDArray[np.void]
 
 
 class Suite:
-    """The sensors of flight number `flight` of the campaign `seed`, with `faults`.
+    """The sensors of flight number `flight` of the campaign `seed`, with `faults`, at a launch `place`.
 
-    Fault times count from the release, `release_s` after power-up.  Errors are drawn in `reset`.
+    Of `faults` it takes those of sensors and inertial samples; their times count from the release, `release_s` after
+    power-up.  Errors are drawn in `reset`.
     """
 
     def __init__(
         self, params: SuiteParams, rates: Rates, seed: int, flight: int = 0, faults: Sequence[Fault] = (),
-        release_s: float = 0.0,
+        release_s: float = 0.0, place: Place = LAUNCH_PLACE,
     ) -> None:  # fmt: skip
-        for fault in faults:
+        self._of_imu = [fault for fault in faults if fault.family == "imu"]
+        self._of_sensors = [fault for fault in faults if fault.family == "sensor"]
+        for fault in self._of_sensors:
             require_possible(fault, params, rates.gps_hz)
         for what in ("magnetometer", "airspeed", "barometer"):
             part = getattr(params, what)
             if part is not None:
                 rates.steps_per_sample(what, part.rate_hz)  # rejected here, before the flight
         self.params = params
-        self.rates = rates
+        self.rates, self.place = rates, place
         self._source = partial(stream, seed, flight)
         self._truth = np.zeros(0, TRUTH_DTYPE)
         self._measured = self._seen = self._shown = np.zeros(0, MEASURED_DTYPE)
@@ -78,7 +84,8 @@ class Suite:
         self._unit = np.zeros(1, UNIT)
         self._memory = np.zeros(1, MEMORY)
         self.faults, self._release_s = tuple(faults), release_s
-        self._faults = NO_FAULTS
+        self._faults, self._samples = NO_FAULTS, EVERY_TICK
+        self._uneven = False
 
     def reset(self, log: Log) -> None:
         """Power up: draw the errors of a flight as long as `log`, whose rows `measure` fills from row 0."""
@@ -95,16 +102,18 @@ class Suite:
         gyro.draw(p.gyro, p.board, rates, source, noise)
         accelerometer.make(p.accelerometer, p.board, rates, source, unit["accelerometer"])
         accelerometer.draw(p.accelerometer, p.board, rates, source, noise)
-        gps.make(p.gps, rates, source, unit["gps"])
+        gps.make(p.gps, rates, source, unit["gps"], self.place)
         gps.draw(p.gps, rates, source, noise)
         if p.magnetometer is not None:
-            magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"])
+            magnetometer.make(p.magnetometer, rates, source, unit["magnetometer"], self.place)
             magnetometer.draw(p.magnetometer, rates, source, noise)
         if p.airspeed is not None or p.barometer is not None:
-            air_data.make(p.airspeed, p.barometer, rates, source, unit["air"])
+            air_data.make(p.airspeed, p.barometer, rates, source, unit["air"], self.place)
             air_data.draw(p.airspeed, p.barometer, rates, source, noise)
         self._unit, self._noise, self._memory = unit, noise, np.zeros(1, MEMORY)
-        self._faults = fault_table(self.faults, self._release_s, rates, source, unit, len(log))
+        self._faults = fault_table(self._of_sensors, self._release_s, rates, source, unit, len(log))
+        self._samples = samples_of(p.board, self._of_imu, self._release_s, rates, source, len(log))
+        self._uneven = len(self._samples) > 0
 
     def measure(self, k: int) -> Measurements:
         """Measure tick `k`, whose truth row is complete; returns a read-only view of a copy of its row.
@@ -114,11 +123,22 @@ class Suite:
         IndexError      the log has no row `k`, or there is no log yet
         """
         _measure(self._truth, self._measured, self._seen, self._noise, k, self._unit, self._memory, self._faults)
+        if self._uneven:
+            take_sample(self._measured, self._seen, k, self._samples, self._memory["imu"][0])
         return tuple.__new__(Measurements, (self._shown, k))  # skips the constructor, 0.15 us
+
+    @property
+    def loses_samples(self) -> bool:
+        """Whether some inertial samples of this flight never arrive; see `lost`."""
+        return bool(self._samples["lost"].any())
+
+    def lost(self, k: int) -> bool:
+        """Whether the inertial sample of tick `k` does not arrive, in a flight that `loses_samples`."""
+        return bool(self._samples["lost"][k])
 
     def snapshot(self) -> Snapshot:
         """The state for `restore`; its arrays are never changed later."""
-        return Snapshot(self._unit, self._noise, self._memory.copy(), self._faults)
+        return Snapshot(self._unit, self._noise, self._memory.copy(), self._faults, self._samples)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Continue from `snapshot` at the next tick; call `reset` with the log first."""
@@ -128,6 +148,7 @@ class Suite:
                 "choose a snapshot of a flight at least as long"
             )
         self._unit, self._noise, self._faults = snapshot.unit, snapshot.noise, snapshot.faults
+        self._samples, self._uneven = snapshot.samples, len(snapshot.samples) > 0
         self._memory = snapshot.memory.copy()
 
 

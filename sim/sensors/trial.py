@@ -139,7 +139,7 @@ def at_rest(
     """Simulate `flights` records of three axes, `seconds` long; `done` is called after each."""
     how, rates = INERTIAL[kind], Rates(imu_hz=IMU_HZ)
     if kind == "gyro":
-        params = replace(params, drift_deg_s_min=0.0)  # the ramp models warm-up
+        params = replace(params, drift_deg_s_min=0.0)  # the drift is warm-up
     n = rates.ticks(seconds)
     m = allan.octaves(n)
 

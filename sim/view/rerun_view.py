@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pymap3d  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation  # type: ignore[import-untyped]
 
@@ -23,14 +22,14 @@ from estimator.interface import Array, HeadingReference, Health
 from estimator.rotation import from_euler
 from sim.log import Event, Flight, Log, Phase
 from sim.outside.wording import printable
-from sim.place import LATITUDE_DEG, LONGITUDE_DEG
+from sim.place import Place
 from sim.recording import RecordingError, digest, replacing
 from sim.view.drawable import drawable
 from sim.view.layout import TIMELINE, blueprint, extent
 from sim.view.loft import Mesh
 from sim.view.mesh import Part, aeroplane, geometry_of
 from sim.view.plots import ESTIMATE, PLOTS, TRUTH, Colour, curves, limits
-from sim.view.story import setting, story
+from sim.view.story import launch_place, setting, story
 from sim.view.viewer import Viewer as Viewer
 from sim.view.viewer import open_viewer as open_viewer
 
@@ -146,11 +145,11 @@ class LiveView:
 class Scene:
     """The fixed parts of the scene.
 
-    parts : of the aeroplane     place : latitude and longitude of the launch point, degrees
+    parts : of the aeroplane     place : of the launch
     """
 
     parts: dict[str, Part]
-    place: tuple[float, float]
+    place: Place
     release_s: float
     heading_reference: HeadingReference
 
@@ -161,16 +160,11 @@ class Scene:
             geometry = geometry_of(str(setting(manifest, "aircraft", "endurance")))
         except ValueError:
             geometry = geometry_of("endurance")
-        place = (
-            float(setting(manifest, "launch_latitude_deg", LATITUDE_DEG)),
-            float(setting(manifest, "launch_longitude_deg", LONGITUDE_DEG)),
-        )
-        return cls(aeroplane(geometry), place, release_s, heading_reference)
+        return cls(aeroplane(geometry), launch_place(manifest), release_s, heading_reference)
 
     def lat_lon_deg(self, p_e_m: Array) -> Array:
-        """Latitude and longitude, shape (n, 2), of positions from the launch point, shape (n, 3) (WGS 84)."""
-        latitude, longitude, _ = pymap3d.ned2geodetic(*p_e_m.T, *self.place, 0.0)
-        return np.column_stack((latitude, longitude))
+        """Latitude and longitude, shape (n, 2), of positions from the launch point, shape (n, 3)."""
+        return self.place.geodetic(p_e_m)[:, :2]
 
 
 def _stream(manifest: Mapping[str, Any], recording_id: str | None) -> "rr.RecordingStream":
@@ -203,7 +197,11 @@ def _send_fixed(rec: "rr.RecordingStream", scene: Scene) -> None:
     rec.log("world/ground/plain", plain, static=True)
     launch = rr.Points3D([[0.0, 0.0, 0.0]], radii=rr.Radius.ui_points(5.0), colors=(255, 255, 255), labels="launch")
     rec.log("world/launch", launch, static=True)
-    home = rr.GeoPoints(lat_lon=[scene.place], radii=rr.Radius.ui_points(5.0), colors=(255, 255, 255))
+    home = rr.GeoPoints(
+        lat_lon=[(scene.place.latitude_deg, scene.place.longitude_deg)],
+        radii=rr.Radius.ui_points(5.0),
+        colors=(255, 255, 255),
+    )
     rec.log("map/launch", home, static=True)
     for lane, colours in _LANE_COLOURS.items():
         words = list(colours)

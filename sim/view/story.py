@@ -1,10 +1,12 @@
 """The summary of a flight in Markdown: what was flown, how it ended, and its verdict."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from sim.log import Flight
 from sim.outside.wording import markdown
+from sim.place import LAUNCH_PLACE, Place
 from sim.rows import Row, markdown_table
 
 
@@ -12,6 +14,17 @@ def setting(manifest: Mapping[str, Any], name: str, otherwise: Any = None) -> An
     """Entry `name` of the manifest, or of the resolved configuration in it (``config``)."""
     value = manifest.get(name, (manifest.get("config") or {}).get(name))
     return otherwise if value is None else value
+
+
+def launch_place(manifest: Mapping[str, Any]) -> Place:
+    """The launch place of a flight, or the origin of a replayed log; that of older recordings was the default."""
+    given = setting(manifest, "place")
+    known = {f.name: getattr(LAUNCH_PLACE, f.name) for f in fields(Place)}
+    if isinstance(given, Mapping):
+        known |= {name: float(given[name]) for name in known if isinstance(given.get(name), int | float)}
+    for name in ("latitude_deg", "longitude_deg"):
+        known[name] = float(setting(manifest, f"launch_{name}", known[name]))
+    return Place(**known)
 
 
 def story(flight: Flight) -> str:

@@ -106,3 +106,12 @@ class RudderStuck(DcmAutopilot):
     def update(self, estimate, m, setpoint) -> ActuatorCommand:
         """As the sound one, but for the rudder."""
         return super().update(estimate, m, setpoint)._replace(rudder=0.0)
+
+
+class NeverTrims(DcmAutopilot):
+    """Learns no deflection that holds an attitude: without the integrals of the rate errors."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        params = params_of(aircraft)
+        untrimmed = replace(params, stabilise=replace(params.stabilise, integral_limit=0.0))
+        super().__init__(untrimmed, heading_reference, aircraft)

@@ -33,6 +33,7 @@ LOOKS_TOO_LATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:LooksAtTheFenceTooLate"}
 CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
+NEVER_TRIMS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverTrims"}
 RUDDER_STUCK = {"autopilot": f"{BROKEN_AUTOPILOTS}:RudderStuck"}
 
 
@@ -108,6 +109,7 @@ MUTATIONS = (
     Mutation("launch_no_gps", "premerlani", CLIMBS_ON, "greatest height"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
+    Mutation("maiden_flight", "premerlani", NEVER_TRIMS, "off the course RMS"),
     Mutation("return_to_launch", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("return_to_launch_strong_wind", "premerlani", NO_YAW, "first within 25 m of the launch point"),
     Mutation("return_to_launch_strong_wind_nose", "premerlani", NO_YAW, "first within 25 m of the launch point"),

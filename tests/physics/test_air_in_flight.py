@@ -94,8 +94,8 @@ def test_rates_of_the_air_are_written_where_the_aeroplane_has_a_place_for_them(m
     """The properties hold what the moving air says; an aeroplane without them flies all the same."""
     load = Model.__init__
 
-    def with_places(self, aircraft, physics_hz):
-        load(self, aircraft, physics_hz)
+    def with_places(self, *args):
+        load(self, *args)
         for name in AIR_RATES:
             self.fdm[name] = 0.0  # JSBSim makes a property by writing it
 

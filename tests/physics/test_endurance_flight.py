@@ -197,7 +197,7 @@ def test_motor_torque_rolls_against_the_propeller(plant):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_full_aileron_at_cruise_rolls_its_own_way_fast_enough(plant, trimmed, sign):
-    """Positive aileron rolls right, at 120 deg/s or more (measured 206, down to 144 through knife edge)."""
+    """Positive aileron rolls right, at 120 deg/s or more (measured 207, down to 147 through knife edge)."""
     rows = fly(plant, 1.0, lambda _t, _row: trimmed._replace(aileron=sign))
     assert np.degrees(sign * rows["omega_b_rad_s"][10:, 0]).min() > 120.0
     assert sign * rows["aileron"][-1] == pytest.approx(1.0, rel=0, abs=1e-6)

@@ -8,7 +8,6 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-import pymap3d
 import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -18,6 +17,7 @@ from scenarios.harness import logs
 from scenarios.harness.cli import console
 from scenarios.harness.gate import workers
 from scenarios.harness.logs.recorded import RecordedLog, Reference
+from sim.place import geodetic
 
 PLACE = 47.4, 8.5, 488.0
 FIELD_E_UT = np.array([21.5, 1.2, 43.0])
@@ -112,7 +112,7 @@ def logged() -> LoggedFlight:
     p_e = position(fix_us)
     return LoggedFlight(
         t_us[1:], rate, force, R[1:].as_matrix(),
-        fix_us, p_e, velocity(fix_us), np.column_stack(pymap3d.ned2geodetic(*(p_e - p_e[0]).T, *PLACE)),
+        fix_us, p_e, velocity(fix_us), geodetic(p_e - p_e[0], *PLACE),
         field_us, R[(field_us - t0_us) // 20_000].inv().apply(FIELD_E_UT),
         air_us, np.linalg.norm(velocity(air_us), axis=1) - 2.0, 60.0 - position(air_us)[:, 2],
     )  # fmt: skip

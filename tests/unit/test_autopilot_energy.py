@@ -41,6 +41,7 @@ def record(params=None):
 def state(airspeed_m_s=CRUISE_M_S, wanted_m_s=CRUISE_M_S, *, known=0, inverted=0):
     s = np.zeros(1, _STATE)[0]
     s["airspeed_m_s"], s["airspeed_wanted_m_s"] = airspeed_m_s, wanted_m_s
+    s["true_factor"] = 1.0
     s["airspeed_known"], s["inverted"] = known, inverted
     return s
 

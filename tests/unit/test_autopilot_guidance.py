@@ -40,7 +40,7 @@ def record():
 
 def state():
     s = np.zeros(1, _STATE)[0]
-    s["airspeed_m_s"] = CRUISE_M_S
+    s["airspeed_m_s"], s["true_factor"] = CRUISE_M_S, 1.0
     return s
 
 

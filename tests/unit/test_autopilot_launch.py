@@ -35,6 +35,7 @@ def everything():
 def cruising():
     s = np.zeros(1, _STATE)[0]
     s["airspeed_m_s"] = s["airspeed_wanted_m_s"] = AutopilotParams().energy.airspeed_m_s
+    s["true_factor"] = 1.0
     return s
 
 

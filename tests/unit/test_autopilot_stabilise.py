@@ -44,7 +44,7 @@ def state():
 
 
 def control_of(demand, R_eb, omega):
-    return rate_control(demand, R_eb, omega, CRUISE_M_S, state(), record(), 0.0)
+    return rate_control(demand, R_eb, omega, CRUISE_M_S, 1.0, state(), record(), 0.0)
 
 
 @given(roll=angle, pitch=pitch, yaw=angle, bank=st.floats(-1.4, 1.4))
@@ -135,8 +135,8 @@ def test_rate_control_coordinated_turn_does_not_leak_into_the_pitch_damping(bank
         elevator_per_rate_error_s=0.0, roll_control_per_rate_error_s=0.0, rudder_per_rate_error_s=0.0
     )
     demand = rate_demand(R, omega, bank, 0.0, 1.0, CRUISE_M_S, record())
-    damped = rate_control(demand, R, omega, CRUISE_M_S, state(), record(), 0.02)
-    without = rate_control(demand, R, omega, CRUISE_M_S, state(), record(undamped), 0.02)
+    damped = rate_control(demand, R, omega, CRUISE_M_S, 1.0, state(), record(), 0.02)
+    without = rate_control(demand, R, omega, CRUISE_M_S, 1.0, state(), record(undamped), 0.02)
     np.testing.assert_allclose(damped, without, rtol=0, atol=ROUND_OFF)
 
 
@@ -168,7 +168,7 @@ def test_elevator_grows_with_bank_on_either_side():
 def test_extra_lift_level_turn_is_one_over_r_zz_minus_one(bank):
     """V q / g + r_zz - 1 with the pitch rate of a level turn is the load factor less one, 1 / cos(bank) - 1."""
     q = G_M_S2 * math.tan(bank) * math.sin(bank) / CRUISE_M_S
-    load = extra_lift(q, math.cos(bank), CRUISE_M_S, record())
+    load = extra_lift(q, math.cos(bank), CRUISE_M_S, 1.0, record())
     np.testing.assert_allclose(load, 1.0 / math.cos(bank) - 1.0, rtol=0, atol=ROUND_OFF)
 
 
@@ -177,7 +177,7 @@ def test_extra_lift_loop_is_centripetal_with_or_against_the_weight(r_zz, less):
     """At the bottom of a loop the lift carries the weight besides, at the top the weight helps to turn."""
     q = 1.5
     expected = CRUISE_M_S * q / G_M_S2 - less
-    np.testing.assert_allclose(extra_lift(q, r_zz, CRUISE_M_S, record()), expected, rtol=0, atol=ROUND_OFF)
+    np.testing.assert_allclose(extra_lift(q, r_zz, CRUISE_M_S, 1.0, record()), expected, rtol=0, atol=ROUND_OFF)
 
 
 @given(roll=angle, pitch=pitch, yaw=angle, omega=st.tuples(*[st.floats(-5.0, 5.0)] * 3))
@@ -215,9 +215,9 @@ def test_elevator_inverted_level_is_down_elevator_for_two_g_less():
     """On its back the wing carries the weight the other way round: two units of cruise lift less, less with speed."""
     R = attitude(math.pi, 0.0)
     for speed_m_s in (CRUISE_M_S, 1.3 * CRUISE_M_S):
-        lift = extra_lift(0.0, R[2, 2], speed_m_s, record())
+        lift = extra_lift(0.0, R[2, 2], speed_m_s, 1.0, record())
         np.testing.assert_allclose(lift, -((CRUISE_M_S / speed_m_s) ** 2) - 1.0, rtol=0, atol=ROUND_OFF)
-    assert extra_lift(-10.0, -1.0, CRUISE_M_S, record()) == -PARAMS.inverted_lift - 1.0
+    assert extra_lift(-10.0, -1.0, CRUISE_M_S, 1.0, record()) == -PARAMS.inverted_lift - 1.0
 
 
 @given(speed=st.floats(8.0, 20.0), rate=st.floats(-2.0, 2.0), axis=st.sampled_from([0, 2]))
@@ -225,7 +225,7 @@ def test_rate_control_deflection_for_a_rate_goes_with_one_over_speed(speed, rate
     """The same helix angle p b / 2 V takes the same deflection."""
     demand = (rate, 0.0, 0.0) if axis == 0 else (0.0, 0.0, rate)
     at_cruise = control_of(demand, np.eye(3), STILL)[axis]
-    fast = rate_control(demand, np.eye(3), STILL, speed, state(), record(), 0.0)[axis]
+    fast = rate_control(demand, np.eye(3), STILL, speed, 1.0, state(), record(), 0.0)[axis]
     np.testing.assert_allclose(fast, at_cruise * CRUISE_M_S / speed, rtol=0, atol=ROUND_OFF)
 
 
@@ -233,7 +233,7 @@ def test_rate_control_deflection_for_a_rate_goes_with_one_over_speed(speed, rate
 def test_extra_lift_for_a_load_goes_with_one_over_speed_squared(speed, load):
     """L = n W: the lift coefficient is n (V_c / V)^2 of that at cruise."""
     np.testing.assert_allclose(
-        extra_lift(0.0, load, speed, record()) + 1.0,
+        extra_lift(0.0, load, speed, 1.0, record()) + 1.0,
         min(load * (CRUISE_M_S / speed) ** 2, 1.0 + PARAMS.load_limit),
         rtol=0,
         atol=ROUND_OFF,
@@ -244,10 +244,10 @@ def test_integral_at_the_stop_waits_and_otherwise_is_limited():
     """A surface at its stop must not wind up its integral; a lasting error never passes the limit."""
     s, p = state(), record()
     for _ in range(1000):
-        rate_control((10.0, 10.0, 0.0), np.eye(3), STILL, CRUISE_M_S, s, p, 0.02)
+        rate_control((10.0, 10.0, 0.0), np.eye(3), STILL, CRUISE_M_S, 1.0, s, p, 0.02)
     assert (s["roll_integral"], s["pitch_integral"]) == (0.0, 0.0)
     for _ in range(1000):
-        rate_control((0.4, 0.2, 0.0), np.eye(3), STILL, CRUISE_M_S, s, p, 0.02)
+        rate_control((0.4, 0.2, 0.0), np.eye(3), STILL, CRUISE_M_S, 1.0, s, p, 0.02)
     assert s["roll_integral"] == PARAMS.integral_limit
     assert s["pitch_integral"] == PARAMS.integral_limit
 

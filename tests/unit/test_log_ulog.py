@@ -4,6 +4,7 @@ import json
 import struct
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,7 +89,7 @@ def messages(flight: Any, without: str = "") -> list[Message]:
         for t, b in zip(flight.field_us, flight.field, strict=True)
     ]  # fmt: skip
     for t, v, h in zip(flight.air_us, flight.airspeed, flight.height, strict=True):
-        told += [(t, "airspeed", 0, (t, 0.97 * v, v)), (t, "vehicle_air_data", 0, (t, 488.0 + h))]
+        told += [(t, "airspeed", 0, (t, v, 1.03 * v)), (t, "vehicle_air_data", 0, (t, 488.0 + h))]
     return [message for message in told if message[1] not in without.split()]
 
 
@@ -214,14 +215,19 @@ def test_fix_without_three_dimensions_or_velocity_is_not_used(logged, write):
     assert not rows["gps_valid"][:700].any()
 
 
-def test_airspeed_without_a_true_one_is_the_indicated(logged, write):
-    """NaN in true_airspeed_m_s."""
+@pytest.mark.parametrize(("without", "height_m"), [((), 488.0 + 60.0), (("vehicle_air_data",), 488.0)])
+def test_true_airspeed_alone_is_converted_by_the_height(logged, write, without, height_m):
+    """NaN in indicated_airspeed_m_s: by the barometer's altitude, or by that of the fixes; the log says so."""
     told = [
-        (t, name, i, (*v[:2], np.nan) if name == "airspeed" else v) for t, name, i, v in messages(logged, "vehicle_imu")
-    ]
+        (t, name, i, (v[0], np.nan, v[2]) if name == "airspeed" else v)
+        for t, name, i, v in messages(logged, "vehicle_imu") if name not in without
+    ]  # fmt: skip
     log = write(ulog(told))
-    assert log.rows["equivalent_airspeed_m_s"][-1] == pytest.approx(0.97 * logged.airspeed[-1], rel=1e-6)
-    assert log.repairs == ()
+    share = (1.0 - 0.0065 * height_m / 288.15) ** 2.12794
+    expected = 1.03 * logged.airspeed[-1] * share
+    assert log.rows["equivalent_airspeed_m_s"][-1] == pytest.approx(expected, rel=2e-3)
+    assert log.repairs == ("true airspeed: converted to equivalent by the height above the sea",)
+    assert log.known["elevation_m"].value == pytest.approx(488.0, abs=10.0)
 
 
 def test_accelerometer_that_was_not_there_is_left_out(logged, write):
@@ -352,7 +358,8 @@ def test_replay_of_the_file_scores_as_the_flight_itself(logged, write, tmp_path,
     capfd.readouterr()
     assert run(["replay", "flight.ulg", "--estimator", "premerlani", "--no-rerun", "--json", "-"]) == 0
     data = json.loads(capfd.readouterr().out)
-    expected = replay(logged.log(), "premerlani").scores
+    flown = replace(logged.log(), rows=expected_of(logged, 0.0))
+    expected = replay(flown, "premerlani", {"elevation_m": 488.0}).scores
     for name in ("inclination_rms_deg", "heading_rms_deg", "rotation_max_deg"):
         assert data[name] == pytest.approx(expected[name], rel=0, abs=1e-3)
     assert (data["rows"], data["reference_kind"]) == (1000, "truth")

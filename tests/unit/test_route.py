@@ -43,6 +43,7 @@ def records(route=None):
         params[name] = astuple(getattr(whole, name))
     s = np.zeros(1, _STATE)[0]
     s["airspeed_m_s"] = s["airspeed_wanted_m_s"] = V
+    s["true_factor"] = 1.0
     return params["route"], params["guidance"], s
 
 

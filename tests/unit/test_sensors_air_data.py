@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from estimator.blocks.air import DENSITY_KG_M3, density_ratio, true_over_equivalent
 from sim.clock import Rates
 from sim.log import Log
-from sim.sensors.air_data import AirspeedParams, BarometerParams, density_kg_m3
+from sim.place import Place
+from sim.sensors.air_data import AirspeedParams, BarometerParams
 from sim.sensors.suite import Suite, SuiteParams
 
 DENSITY = 101325.0 / (287.05287 * 288.15)  # p / R T of ISO 2533 at sea level, 1.225
@@ -17,14 +19,16 @@ PA_M = DENSITY * 9.80665  # what pressure falls by in a metre there
 DOUBTED_ONCE_IN = 1e-5
 
 
-def sensed(airspeed=None, barometer=None, speed_m_s=0.0, height_m=0.0, n=50, rates=None, seed=0, flight=0, **truth):
+def sensed(airspeed=None, barometer=None, speed_m_s=0.0, height_m=0.0, n=50, rates=None, seed=0, flight=0,
+           elevation_m=0.0, **truth):  # fmt: skip
     """Measured rows of a flight with this airspeed and height, numbers or shape (n,)."""
     rates = rates or Rates()
     log = Log.empty(n)
     log.truth["airspeed_m_s"], log.truth["p_e_m"][:, 2] = speed_m_s, -np.asarray(height_m)
     for name, value in truth.items():
         log.truth[name] = value
-    suite = Suite(SuiteParams(airspeed=airspeed, barometer=barometer), rates, seed, flight)
+    place = Place(elevation_m=elevation_m)
+    suite = Suite(SuiteParams(airspeed=airspeed, barometer=barometer), rates, seed, flight, place=place)
     suite.reset(log)
     for k in range(n):
         suite.measure(k)
@@ -52,7 +56,7 @@ def assert_sigma(values, sigma):
 @pytest.mark.parametrize(("height_m", "density"), [(0.0, 1.225), (1000.0, 1.11164), (3000.0, 0.909122)])
 def test_density_is_that_of_the_standard_atmosphere(height_m, density):
     """The table of ISO 2533, to its six digits."""
-    np.testing.assert_allclose(density_kg_m3(height_m), density, rtol=1e-5, atol=0)
+    np.testing.assert_allclose(DENSITY_KG_M3 * density_ratio(height_m), density, rtol=1e-5, atol=0)
 
 
 def test_perfect_air_data_are_the_truth():
@@ -62,7 +66,8 @@ def test_perfect_air_data_are_the_truth():
     rows = sensed(AirspeedParams(), BarometerParams(), speed, height, n=200)
     new = np.flatnonzero(rows["air_new"])
     np.testing.assert_array_equal(new, np.arange(4, 200, 5))
-    np.testing.assert_allclose(rows["equivalent_airspeed_m_s"][new], speed[new], rtol=0, atol=1e-13)
+    share = (1.0 - 0.0065 * height[new] / 288.15) ** 2.12794  # of the root of the density
+    np.testing.assert_allclose(rows["equivalent_airspeed_m_s"][new], speed[new] * share, rtol=1e-6, atol=0)
     np.testing.assert_array_equal(rows["baro_height_m"][new], height[new])
 
 
@@ -86,8 +91,34 @@ def test_samples_are_in_the_first_tick_that_ends_at_their_time_or_later(physics_
     stamps = np.array(list(due.values()))
     # Before the end of the first tick there is nothing to interpolate from.
     later = stamps >= 1.0 / imu_hz
-    np.testing.assert_allclose(rows["equivalent_airspeed_m_s"][new][later], 2.0 + stamps[later], rtol=0, atol=1e-12)
+    shares = np.array([true_over_equivalent(3.0 * t) for t in t_s[new]])[later]
+    read = rows["equivalent_airspeed_m_s"][new][later] * shares
+    np.testing.assert_allclose(read, 2.0 + stamps[later], rtol=0, atol=1e-12)
     np.testing.assert_allclose(rows["baro_height_m"][new][later], 3.0 * stamps[later], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("elevation_m", "height_m", "share"), [(0.0, 1000.0, 0.953), (940.0, 60.0, 0.953), (2840.0, 60.0, 0.866)]
+)
+def test_pitot_tube_reads_the_equivalent_airspeed(elevation_m, height_m, share):
+    """V sqrt(rho / rho0) with the densities of the ISO 2533 table, wherever the height comes from."""
+    read = speeds(AirspeedParams(), 14.0, height_m=height_m, elevation_m=elevation_m)
+    np.testing.assert_allclose(read / 14.0, share, rtol=0, atol=6e-4)
+
+
+def test_full_scale_of_a_pitot_tube_is_a_pressure():
+    """100 Pa are 12.78 m/s of equivalent airspeed at any elevation, and a faster true one where the air is thin."""
+    params = AirspeedParams(range_pa=100.0)
+    for elevation_m in (0.0, 3000.0):
+        limit = math.sqrt(200.0 / 1.225) * true_over_equivalent(elevation_m)
+        read = speeds(params, np.repeat([0.99 * limit, 1.01 * limit], 5), n=10, elevation_m=elevation_m)
+        np.testing.assert_allclose(read, math.sqrt(200.0 / 1.225) * np.array([0.99, 1.0]), rtol=1e-6, atol=0)
+
+
+def test_barometer_counts_from_the_launch_point_at_any_elevation():
+    """12.01 Pa a metre at sea level, 9.2 at 2500 m: the same noise is more height there."""
+    rows = heights(BarometerParams(noise_pa=1e-3), 30.0, elevation_m=2500.0)
+    np.testing.assert_allclose(rows, 30.0, rtol=0, atol=1e-3)
 
 
 def test_two_rates_hold_each_its_last_sample():
@@ -233,6 +264,20 @@ def test_barometer_drifts_steadily_with_the_sigma_of_its_rate():
         np.testing.assert_allclose(read[49] / read[-1], 0.5, rtol=1e-3, atol=0)  # curvature of 10 Pa: 1e-5
         drawn.append(-read[-1] * PA_M / 10.0)
     assert_sigma(drawn, 1.0)
+
+
+def test_barometer_drift_levels_off():
+    """After one time constant 1 - 1 / e of it, after many all of it; the same slope at power-up whatever that is."""
+
+    def drawn(drift_s):
+        suite = Suite(SuiteParams(barometer=BarometerParams(drift_pa_min=6.0, drift_s=drift_s)), Rates(), 5)
+        suite.reset(Log.empty(3000))
+        return suite.snapshot().noise["baro_error_pa"]
+
+    short, long = drawn(5.0), drawn(36000.0)
+    np.testing.assert_allclose(short[249] / long[249], 1.0 - math.exp(-1.0), rtol=1e-3, atol=0)
+    np.testing.assert_allclose(short[-1] * 12.0 / long[-1], 1.0, rtol=2e-3, atol=0)  # 60 s are 12 of 5 s
+    np.testing.assert_allclose(short[0] / long[0], 1.0, rtol=3e-3, atol=0)
 
 
 def test_barometer_wanders_with_its_sigma_and_time_constant():

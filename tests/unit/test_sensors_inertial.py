@@ -1,6 +1,7 @@
 """Gyro and accelerometer, one error at a time: each has the sigma, the growth and the limits of its data sheet."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ from scipy import stats
 
 from sim.clock import Rates
 from sim.log import Log
+from sim.rng import stream
+from sim.sensors import gyro
 from sim.sensors.accelerometer import AccelerometerParams
+from sim.sensors.board import BoardParams
 from sim.sensors.gyro import GyroParams
 from sim.sensors.suite import SUITES, Suite, SuiteParams
 
@@ -67,13 +71,31 @@ def test_gyro_turn_on_bias_has_its_sigma_and_stays():
     np.testing.assert_array_equal(reading, np.broadcast_to(reading[:, :1], reading.shape))
 
 
-def test_gyro_drift_is_a_ramp_with_its_sigma():
+def test_gyro_drift_begins_as_a_ramp_with_its_sigma():
     """0.2 deg/s per minute: a straight line in time whose slope scatters over flights."""
     reading = flights(300, 50, drift_deg_s_min=0.2)
     slope_deg_s_min = reading[:, -1] * 60.0
     assert_sigma(slope_deg_s_min, 0.2)
     line = reading[:, -1:] * (np.arange(1, 51) / 50.0)[:, None]
-    np.testing.assert_allclose(reading, line, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(reading, line, rtol=2e-3, atol=0)  # 1 s of 300 s: bent by 1 s / 600 s
+
+
+def test_gyro_drift_levels_off_with_the_warming_of_the_board():
+    """The solution of T b' = s T - b: in the end 5 min of 0.2 deg/s per minute are 1 deg/s, and never more."""
+    rates, params = Rates(), GyroParams(**{**NO_GYRO_ERROR, "drift_deg_s_min": 0.2})
+    hour = np.zeros(rates.ticks(3600.0), list(gyro.NOISE))
+    for flight in range(4):
+        gyro.draw(params, BoardParams(), rates, partial(stream, 3, flight), hour)
+        slope_deg_s = 0.2 / 60.0 * stream(3, flight, "gyro drift").standard_normal(3)
+        bias_deg_s = np.degrees(hour["gyro_bias_b_rad_s"])
+        for t_s, time_s in ((60, 54.3808), (300, 189.6362), (1200, 294.5053), (3600, 299.9982)):
+            np.testing.assert_allclose(bias_deg_s[50 * t_s - 1], slope_deg_s * time_s, rtol=1e-6, atol=0)
+    slow, rate = np.zeros(3000, list(gyro.NOISE)), BoardParams(warming_s=60.0)
+    gyro.draw(params, rate, rates, partial(stream, 3, 0), slow)
+    np.testing.assert_allclose(
+        np.degrees(slow["gyro_bias_b_rad_s"][-1]),
+        0.2 * (1.0 - math.exp(-1.0)) * stream(3, 0, "gyro drift").standard_normal(3), rtol=1e-12, atol=0,
+    )  # fmt: skip
 
 
 def test_gyro_random_walk_grows_with_the_root_of_time():

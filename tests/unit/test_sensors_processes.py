@@ -144,7 +144,7 @@ def test_bias_follows_the_temperature_with_the_sigma_of_its_slope(column, unit, 
 
 def test_bias_of_a_board_that_keeps_its_temperature_has_no_warming():
     """Whatever the part's sensitivity is, the temperature of power-up is where the turn-on bias holds."""
-    still = drawn(board=BoardParams())[0]
+    still = drawn(board=BoardParams(warming_s=WARM.warming_s))[0]
     blind = drawn(0, replace(FULL_GYRO, bias_per_k_deg_s=0.0), replace(FULL_FORCE, bias_per_k_mg=0.0))[0]
     np.testing.assert_array_equal(still, blind)
 

@@ -57,11 +57,12 @@ def test_gyro_error_switched_off_leaves_every_other_draw_unchanged(error):
 
 
 def test_drift_is_added_to_an_unchanged_walk():
-    """Bias with drift minus bias without is the straight line of the drift alone."""
+    """Bias with drift minus bias without is the curve of the drift alone, 300 s of the board's warming."""
     still = replace(GENERIC.gyro, drift_deg_s_min=0.0)
     name = "gyro_bias_b_rad_s"
     ramp = drawn().noise[name] - drawn(replace(GENERIC, gyro=still)).noise[name]
-    np.testing.assert_allclose(ramp, np.arange(1, 201)[:, None] * ramp[-1] / 200.0, rtol=0, atol=1e-15)
+    curve = 1.0 - np.exp(-np.arange(1, 201)[:, None] / 50.0 / 300.0)
+    np.testing.assert_allclose(ramp, curve * ramp[-1] / curve[-1], rtol=0, atol=1e-15)
     assert np.all(ramp[-1] != 0.0)
 
 

@@ -36,6 +36,7 @@ from scenarios.harness.cli.options import (
     ReferenceOption,
     ScenarioArgument,
     SeedsOption,
+    SetAirframeOption,
     SeveralOption,
     UnitOption,
     VerdictOption,
@@ -323,13 +324,14 @@ def bench(
 @app.command()
 def aircraft(
     name: Annotated[str, typer.Argument(help="Name of an aircraft.", autocompletion=complete.aircraft)],
+    set_: SetAirframeOption = None,
     picture: PictureOption = None,
     json_: JsonOption = None,
 ) -> None:
     """Print a performance page of an aeroplane: speeds, glide, climb, turns, stability and natural modes."""
     from scenarios.harness.commands import aircraft as command
 
-    command.run(name, picture, json_)
+    command.run(name, set_, picture, json_)
 
 
 @app.command()

@@ -40,6 +40,12 @@ SetOption = Annotated[
         "--set", metavar="NAME=VALUE", help="Any other parameter, for example gps.latency_s=0.5 or my_filter.k_p=1."
     ),
 ]
+SetAirframeOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="NAME=VALUE", help="A difference from the drawing, for example airframe.mass_factor=1.1."
+    ),
+]
 WindOption = Annotated[
     str | None,
     typer.Option(

@@ -6,14 +6,19 @@ Performance comes from trims (`sim.aeroplane.performance`), the modes from the m
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from estimator.interface import G_M_S2
 from scenarios.harness.cli import console
+from scenarios.harness.cli.options import changes_of
 from scenarios.harness.cli.reports import attempt, check_picture, reporting, usage
+from scenarios.harness.config.tolerances import set_airframe
 from sim.aeroplane import performance
+from sim.aeroplane.built import AS_DRAWN, differences_of, require_flyable
 from sim.aeroplane.derivatives import Airframe, coefficients, lanchester, textbook
 from sim.aeroplane.jsbsim_model import Model
 from sim.aeroplane.linear import Mode, linearise, modes
@@ -64,6 +69,7 @@ class Handbook:
         theory = {name: mode_json(m) for name, m in self.textbook.items()}
         return {
             "aircraft": self.name,
+            "airframe": asdict(self.model.built),
             "height_m": p.height_m,
             "mass_kg": frame.mass_kg,
             "wing_area_m2": frame.area_m2,
@@ -94,9 +100,14 @@ class Handbook:
         }
 
 
-def make(name: str, height_m: float = HEIGHT_M) -> Handbook:
-    """Compute the page of the aircraft `name`; ValueError if there is no such aircraft."""
-    model = Model(name, PHYSICS_HZ)
+def make(name: str, differences: Mapping[str, Any] = MappingProxyType({}), height_m: float = HEIGHT_M) -> Handbook:
+    """Compute the page of the aircraft `name`; ValueError if there is no such aircraft.
+
+    differences : from the drawing, ``airframe.mass_factor``, see `scenarios.harness.config.tolerances`
+    """
+    model = Model(name, PHYSICS_HZ, set_airframe(differences))
+    if model.built != AS_DRAWN:
+        require_flyable(model, height_m)
     p = performance.measure(model, height_m)
     linear = linearise(model, p.cruise, height_m)
     frame = Airframe.of(model, linear)
@@ -149,6 +160,8 @@ def print_report(book: Handbook) -> None:
     frame = f"  {f.mass_kg:.3f} kg, {f.area_m2:.3f} m2, span {f.span_m:.2f} m, {loading}"
     out.print(console.titled(book.name, frame))
     out.print(f"Still air, {book.performance.height_m:g} m; modes at the cruise.", style="dim")
+    if differences := differences_of(book.model.built):
+        out.print(f"Not as drawn: {differences}.")
     out.print(console.table("Performance", ("", "", ""), figures(book), text=(0, 2)))
     out.print(_polar(book))
     out.print(_turns(book))
@@ -246,12 +259,12 @@ def _derivatives(book: Handbook) -> Any:
     return console.table("Derivatives, per rad and per full deflection", [""] * 6, rows, text=(0, 2, 4))
 
 
-def run(name: str, picture: Path | None, json_: str | None) -> None:
+def run(name: str, set_: list[str] | None, picture: Path | None, json_: str | None) -> None:
     """Do what the command line asks for."""
     with reporting(json_) as report:
         with usage():
             check_picture(picture)
-            book = make(name)
+            book = make(name, changes_of(set_))
         if picture is not None:
             from scenarios.harness.commands import aircraft_picture
 

@@ -13,10 +13,11 @@ from scenarios.harness.cli.reports import check_file, reporting, usage, write
 from scenarios.harness.commands import export_text
 from scenarios.harness.commands.view import newest
 from sim import gps_messages, recording
-from sim.gps_messages import Accuracy, Fixes
+from sim.gps_messages import Accuracy, Fixes, Place
 from sim.log import Flight
 from sim.outside import files as strangers
 from sim.sensors.fitting import suite_params
+from sim.view.story import launch_place
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +93,21 @@ def make_of(
         raise ValueError(f"no GPS fix arrived in {source}: nothing to export")
     files: dict[str, tuple[Path, bytes]] = {}
     if nmea is not None:
-        files["NMEA"] = nmea, gps_messages.encode_nmea(fixes, start=start)
+        files["NMEA"] = nmea, gps_messages.encode_nmea(fixes, origin_of(flight), start)
     if ubx is not None:
-        files["UBX"] = ubx, gps_messages.encode_ubx(fixes, start=start)
+        files["UBX"] = ubx, gps_messages.encode_ubx(fixes, origin_of(flight), start)
     if csv is not None:
         columns = export_text.columns(flight)
         text = export_text.to_csv(columns).encode()
         files["CSV"] = csv, gzip.compress(text, mtime=0) if csv.suffix == ".gz" else text
         files["map"] = map_of(csv), export_text.to_map(columns, flight, csv.name).encode()
     return Export(source, fixes, start, files, len(flight.log))
+
+
+def origin_of(flight: Flight) -> Place:
+    """The launch point of `flight`, from which its positions count."""
+    place = launch_place(flight.manifest)
+    return Place(place.latitude_deg, place.longitude_deg, place.elevation_m)
 
 
 def _require_apart(nmea: Path | None, ubx: Path | None, csv: Path | None) -> None:

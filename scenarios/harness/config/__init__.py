@@ -12,6 +12,7 @@ from scenarios.harness.config.flight import (
     override,
     resolve,
 )
+from scenarios.harness.config.place import PlaceConfig
 from scenarios.harness.config.start import BenchStart, HandMotion, HandThrowStart, InFlightStart
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "HandMotion",
     "HandThrowStart",
     "InFlightStart",
+    "PlaceConfig",
     "RatesConfig",
     "Wind",
     "build_air",

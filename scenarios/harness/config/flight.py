@@ -17,13 +17,14 @@ from scenarios.harness.config.air import parse_wind, resolve_air
 from scenarios.harness.config.battery import BatteryConfig
 from scenarios.harness.config.faults import require_faults_possible, typed_faults
 from scenarios.harness.config.fence import FenceConfig, within_box
+from scenarios.harness.config.place import PlaceConfig
 from scenarios.harness.config.start import AnyStart, BenchStart, HandThrowStart, InFlightStart, resolve_start
 from scenarios.harness.config.tolerances import AirframeConfig, TolerancesConfig, resolve_airframe
 from scenarios.harness.config.validation import validated
 from scenarios.harness.plugins import Maker
 from scenarios.harness.seeds import LARGEST_SEED
 from scenarios.harness.settings import parameter_name
-from sim.clock import Rates
+from sim.clock import Rates, physics_hz
 from sim.log import FLOWN_DTYPE, TRUTH_DTYPE
 from sim.outside.numbers import RIGHT, is_odd, number
 from sim.outside.wording import printable
@@ -45,17 +46,18 @@ class _Model(BaseModel):
 class RatesConfig(_Model):
     """Rates in hertz; the slower ones divide the physics rate (`sim.clock.Rates`).
 
-    gps_hz : None is the rate of the receiver that is fitted; a resolved configuration holds the number
+    physics_hz : None is 200 Hz, or the inertial rate where that is higher
+    gps_hz : None is the rate of the receiver that is fitted; a resolved configuration holds the numbers
     """
 
-    physics_hz: int = 200
+    physics_hz: int | None = None
     imu_hz: int = 50
     gps_hz: float | None = None
 
     @model_validator(mode="after")
     def _divide(self) -> "RatesConfig":
         if self.gps_hz is None:
-            Rates(self.physics_hz, self.imu_hz)
+            Rates(self.physics_hz or physics_hz(self.imu_hz), self.imu_hz)
         else:
             self.build()
         return self
@@ -64,7 +66,7 @@ class RatesConfig(_Model):
         """The clock of these rates; ValueError if the GPS rate is still the receiver's own."""
         if self.gps_hz is None:
             raise ValueError("rates.gps_hz = None: resolve the configuration first")
-        return Rates(self.physics_hz, self.imu_hz, self.gps_hz)
+        return Rates(self.physics_hz or physics_hz(self.imu_hz), self.imu_hz, self.gps_hz)
 
 
 class FlightConfig(_Model):
@@ -103,6 +105,7 @@ class FlightConfig(_Model):
     faults: tuple[str, ...] = ()
     battery: BatteryConfig = Field(default_factory=BatteryConfig)
     air: AirConfig = Field(default_factory=AirConfig)
+    place: PlaceConfig = Field(default_factory=PlaceConfig)
     airframe: AirframeConfig = Field(default_factory=AirframeConfig)
     tolerances: TolerancesConfig = Field(default_factory=TolerancesConfig)
     start: Annotated[AnyStart, Field(discriminator="kind")] = Field(default_factory=InFlightStart)
@@ -330,9 +333,10 @@ def resolve(config: FlightConfig, suite: SuiteParams | None = None) -> FlightCon
 
 
 def _resolve_rates(config: FlightConfig, suite: SuiteParams | None) -> RatesConfig:
-    if config.rates.gps_hz is not None:
-        return config.rates
-    receiver_hz = (suite or fitted_suite(config)).gps.rate_hz
-    rates = config.rates.model_copy(update={"gps_hz": receiver_hz})
+    rates = config.rates
+    if rates.gps_hz is not None and rates.physics_hz is not None:
+        return rates
+    receiver_hz = rates.gps_hz or (suite or fitted_suite(config)).gps.rate_hz
+    rates = rates.model_copy(update={"gps_hz": receiver_hz, "physics_hz": rates.physics_hz or physics_hz(rates.imu_hz)})
     rates.build()  # refuses a receiver whose rate the physics cannot keep
     return rates

@@ -21,7 +21,8 @@ def build_plant(config: FlightConfig, rates: Rates, faults: Sequence[Fault] = ()
     if isinstance(start, BenchStart):
         roll_rad, pitch_rad, heading_rad = _radians((start.roll_deg, start.pitch_deg, config.heading_deg))
         rest = Rest(roll_rad, pitch_rad, heading_rad, start.height_m)
-        return PrescribedPlant(rest, rates, release_s=start.calibration_s)
+        place = config.place
+        return PrescribedPlant(rest, rates, place.latitude_deg, start.calibration_s, place.elevation_m)
     return JsbsimPlant(
         config.aircraft,
         start=build_start(config),
@@ -30,6 +31,7 @@ def build_plant(config: FlightConfig, rates: Rates, faults: Sequence[Fault] = ()
         seed=config.seed,
         flight=config.flight,
         box=FlightBox(config.box_radius_m, config.box_height_m),
+        place=config.place.build(),
         faults=of_family("actuator", faults),
         battery=config.battery.build(),
         built=built(config.airframe),

@@ -5,13 +5,17 @@ for each flight.  A difference that is set is not drawn.  The autopilot always h
 """
 
 import math
+from collections.abc import Mapping
 from statistics import NormalDist
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from scenarios.harness.config.validation import validated
 from sim.aeroplane.built import AS_DRAWN, AsBuilt, drawn_inertia_kg_m2, has_motor, require_flyable
+from sim.outside.wording import brief
+from sim.params import near_misses
 from sim.rng import stream
 
 MOST_SIGMA = 2.0  # beyond which nothing is drawn: a builder would have noticed
@@ -104,6 +108,23 @@ def built(airframe: AirframeConfig) -> AsBuilt:
     if "random" in values.values():
         raise ValueError("airframe: resolve the configuration first")
     return AsBuilt(**values)
+
+
+def set_airframe(changes: Mapping[str, Any]) -> AsBuilt:
+    """The aeroplane with differences by dotted names, ``airframe.mass_factor``, and as drawn else; ValueError."""
+    names = [f"airframe.{name}" for name in AirframeConfig.model_fields]
+    for name in changes:
+        if name not in names:
+            raise ValueError(f"unknown parameter {brief(name)}: {near_misses(name, names)}")
+    values = {name.removeprefix("airframe."): value for name, value in changes.items()}
+    data = {"airframe": {name: value for name, value in values.items() if value != "random"}}
+    return built(resolve_airframe(validated(_Alone, data).airframe, TolerancesConfig(), "", False, 0, 0))
+
+
+class _Alone(_Model):
+    """So that messages name the fields as a whole configuration does."""
+
+    airframe: AirframeConfig
 
 
 def require_sound(airframe: AirframeConfig, aircraft: str, physics_hz: int, flies: bool) -> None:

@@ -66,8 +66,9 @@ _SCALARS: tuple[tuple[frozenset[str], str], ...] = tuple(
                      "|spd|gspd|gps velocity|gps vel|ground velocity|gps gspeed|vel m s|gps velocity m s",
         "gps.course": "gps course|course|cog|ground course|gps ground course|gps cog|gps heading|course over ground"
                       "|gcrs|gps gcrs|gps track|ground track|gps hdg",
-        "airspeed": "airspeed|air speed|ias|tas|indicated airspeed|true airspeed|indicated air speed|true air speed"
-                    "|aspd|pitot speed|pitot airspeed|airspeed ias|airspeed tas",
+        "airspeed": "airspeed|air speed|ias|eas|cas|indicated airspeed|indicated air speed|equivalent airspeed"
+                    "|calibrated airspeed|aspd|pitot speed|pitot airspeed|airspeed ias|airspeed eas",
+        "true_airspeed": "tas|true airspeed|true air speed|airspeed tas",
         "height": "baro height|height|baro alt|baro altitude|barometric height|barometric altitude|pressure altitude"
                   "|altimeter relative altitude|barometer altitude|barometer height|baro|barometer alt",
         "interval": "dt|interval|sample interval|imu dt",
@@ -290,7 +291,7 @@ def _scalar(words: list[str], indices: tuple[str, ...]) -> Iterable[tuple[str, i
     for rank, (wanted, quantity) in enumerate(_SCALARS):
         if present == wanted or present - _NEUTRAL == wanted or present - _NEUTRAL - {"nav", "pvt"} == wanted:
             gps = 0 if "gps" in present or not quantity.startswith("gps.") else 1
-            order = {"tas": 1, "ias": 2, "indicated": 2}
+            order = {"ias": 1, "indicated": 1}
             yield quantity, gps + max((order.get(w, 0) for w in wanted), default=0), str(rank), 1.0
             return
 

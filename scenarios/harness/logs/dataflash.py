@@ -14,7 +14,7 @@ import numpy as np
 from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import attitudes, streams
+from scenarios.harness.logs import airspeeds, attitudes, streams
 from scenarios.harness.logs.ardupilot import FIX_3D, Parameters, year_of
 from scenarios.harness.logs.ardupilot_matlab import MatlabMessages
 from scenarios.harness.logs.dataflash_records import Clock, DataFlash, Records, own_time_s
@@ -161,6 +161,7 @@ class _Log:
             "gps_latency_s": self.parameters.latency(records.instance),
             "gps_vertical_velocity": reports,
             "declination_rad": self.parameters.declination(place, year_of(records.where(~no_fix))),
+            **airspeeds.elevation(None if place is None else place[2], f"altitude of {records.name}"),
         }
 
     def _reports_vertical(self, fixes: Records) -> Known | None:

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pymap3d  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from estimator.interface import Array
 from scenarios.harness.logs import accounts
+from sim.place import local
 
 LEAST_FIX = 3.0  # a fix of three dimensions
 LATEST_S, EARLIEST_S = 10.0, 0.1  # stamps later or earlier than this are from another clock
@@ -30,6 +30,7 @@ class Reports:
     values: Array
     lost: NDArray[np.bool_]
     place: tuple[float, float] | None
+    altitude_m: float | None
 
 
 def reports(
@@ -61,9 +62,11 @@ def reports(
             f"gps.fix is never {LEAST_FIX:g} or more: no fix is used; for a column that is only 0 or 1 use gps.valid"
         )
     good = read & ~np.any([where for where, _ in why], axis=0)
-    position, place = _position(table, units_given, good, repairs)
+    position, place, altitude_m = _position(table, units_given, good, repairs)
     stamps = table.get("gps.time", np.full(n, np.nan))
-    return Reports(np.asarray(read), why, np.column_stack((position, velocity, stamps)), np.asarray(lost), place)
+    return Reports(
+        np.asarray(read), why, np.column_stack((position, velocity, stamps)), np.asarray(lost), place, altitude_m
+    )
 
 
 def _read(table: Mapping[str, Array], columns: Array) -> NDArray[np.bool_]:
@@ -104,11 +107,11 @@ def _velocity(table: Mapping[str, Array], units_given: frozenset[str]) -> Array 
 
 def _position(
     table: Mapping[str, Array], units_given: frozenset[str], good: NDArray[np.bool_], repairs: list[str]
-) -> tuple[Array, tuple[float, float] | None]:
-    """Position relative to the first of the `good` reports, shape (n, 3), NaN if unknown; and that origin."""
+) -> tuple[Array, tuple[float, float] | None, float | None]:
+    """Position relative to the first of the `good` reports, shape (n, 3), NaN if unknown; that origin, its altitude."""
     n = len(good)
     if not ("gps.latitude" in table and "gps.longitude" in table):
-        return np.column_stack([table.get(f"gps.{a}", np.zeros(n)) for a in "ned"]), None
+        return np.column_stack([table.get(f"gps.{a}", np.zeros(n)) for a in "ned"]), None, None
     latitude, longitude = table["gps.latitude"], table["gps.longitude"]
     altitude = table.get("gps.altitude", np.zeros(n))
     if not {"gps.latitude", "gps.longitude"} & units_given:
@@ -126,11 +129,11 @@ def _position(
     there = np.isfinite(latitude + longitude + altitude) & (np.abs(latitude) <= 90.0) & (latitude != 0.0)
     first = np.flatnonzero(there & good)
     if not len(first):
-        return np.zeros((n, 3)), None
+        return np.zeros((n, 3)), None, None
     origin = latitude[first[0]], longitude[first[0]], altitude[first[0]]
     ned = np.full((n, 3), np.nan)
-    ned[there] = np.column_stack(pymap3d.geodetic2ned(latitude[there], longitude[there], altitude[there], *origin))
-    return ned, (float(origin[0]), float(origin[1]))
+    ned[there] = local(latitude[there], longitude[there], altitude[there], *map(float, origin))
+    return ned, (float(origin[0]), float(origin[1])), float(origin[2]) if "gps.altitude" in table else None
 
 
 def on_this_clock(stamps: Array, arrived_s: Array, repairs: list[str]) -> bool:

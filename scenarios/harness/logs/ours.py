@@ -14,8 +14,7 @@ from scenarios.harness.logs.recorded import LogError, RecordedLog, Reference
 from sim import recording
 from sim.log import Flight
 from sim.outside import files
-from sim.place import LATITUDE_DEG, LONGITUDE_DEG
-from sim.view.story import setting
+from sim.view.story import launch_place
 
 
 def read(path: Path) -> RecordedLog:
@@ -85,10 +84,8 @@ def on_ground_of(flight: Flight) -> ImuSample | None:
 
 def place_of(flight: Flight) -> tuple[float, float]:
     """Latitude and longitude of the launch point, degrees."""
-    return (
-        float(setting(flight.manifest, "launch_latitude_deg", LATITUDE_DEG)),
-        float(setting(flight.manifest, "launch_longitude_deg", LONGITUDE_DEG)),
-    )
+    place = launch_place(flight.manifest)
+    return place.latitude_deg, place.longitude_deg
 
 
 def _measured(rows: NDArray[Any]) -> dict[str, Known]:

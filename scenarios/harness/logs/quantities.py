@@ -38,6 +38,7 @@ QUANTITIES: dict[str, str] = {  # quantity -> dimension, a key of `units.UNITS`
     "gps.speed": "speed",
     "gps.course": "angle",
     "airspeed": "speed",
+    "true_airspeed": "speed",
     "height": "length",
     "air.new": "number",
     "height.new": "number",

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pymap3d  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter  # type: ignore[import-untyped]
 
@@ -27,6 +26,7 @@ from scenarios.harness.logs.quantities import INERTIAL
 from scenarios.harness.logs.recorded import Kind, LogError, RecordedLog, Reference
 from scenarios.harness.logs.validity import usable
 from sim.outside import files
+from sim.place import local
 
 SLOWEST_S = 0.1  # samples further apart cannot be integrated
 FEW = 0.01  # a smaller share of the fixes is damage
@@ -280,7 +280,7 @@ def _put_fixes(ticks: _Ticks, fixes: Stream | None, known: dict[str, Known]) -> 
     origin = latitude[0], longitude[0], altitude[0]
     rows["gps_valid"] = _holds(rows, fixes)
     rows["gps_t_s"][ever] = true_s
-    rows["gps_p_e_m"][ever] = np.column_stack(pymap3d.geodetic2ned(latitude, longitude, altitude, *origin))
+    rows["gps_p_e_m"][ever] = local(latitude, longitude, altitude, *map(float, origin))
     rows["gps_v_e_m_s"][ever] = np.column_stack((n, e, d))
     rows["gps_speed_m_s"][ever] = np.hypot(n, e)
     rows["gps_course_rad"][ever] = np.arctan2(e, n) % (2.0 * np.pi)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from estimator.blocks.screening import LONGEST_GAP_S
 from estimator.instruments import Known
 from estimator.interface import MEASURED_DTYPE, Array
-from scenarios.harness.logs import accounts, attitudes, checks, fixes, properties
+from scenarios.harness.logs import accounts, airspeeds, attitudes, checks, fixes, properties
 from scenarios.harness.logs.column_groups import Group, alone, take
 from scenarios.harness.logs.column_map import ColumnMap
 from scenarios.harness.logs.ledger import Ledger
@@ -69,6 +69,8 @@ def recorded(
     rows["t_s"], rows["dt_s"] = t_s[keep], _intervals(main, keep, repairs)
     rows["gyro_b_rad_s"], rows["force_b_m_s2"] = np.hsplit(numbers[keep], 2)
     rows["baro_height_m"] = np.nan
+    if "elevation_m" in meanings.known:
+        made.known["elevation_m"] = meanings.known["elevation_m"]
     for group in groups:
         order = np.argsort(group.table["time"], kind="stable")  # samples without a time come last
         in_order = {name: values[order] for name, values in group.table.items()}
@@ -216,6 +218,7 @@ def _take_fixes(made: _Making, group: Group) -> None:
     if not new.any():
         return
     made.place = made.place or found.place
+    made.known = {**airspeeds.elevation(found.altitude_m, "altitude of the first fix"), **made.known}
     rows["gps_new"] = new
     position = found.values[:, :3]
     known = np.isfinite(position).all(axis=1) & ~found.lost  # without a position the last one holds
@@ -275,6 +278,8 @@ def _take_field(made: _Making, group: Group) -> None:
 def _take_air(made: _Making, group: Group) -> None:
     """Fill airspeed and height; without ``air.new`` and ``height.new`` each number is a sample."""
     rows, table = made.rows, group.table
+    if "true_airspeed" in table and "airspeed" not in table:
+        table["airspeed"] = _equivalent(made, table)
     for stream, quantity, column, flags in (
         ("airspeed", "airspeed", "equivalent_airspeed_m_s", ("air.new",)),
         ("barometer", "height", "baro_height_m", ("height.new", "air.new")),
@@ -294,6 +299,16 @@ def _take_air(made: _Making, group: Group) -> None:
                 rows["air_new"] |= new
     if "height" in table and "airspeed" not in made.ledger and rows["air_new"].any():
         rows["equivalent_airspeed_m_s"] = np.nan  # air data without a pitot tube
+
+
+def _equivalent(made: _Making, table: Mapping[str, Array]) -> Array:
+    """The true airspeed of the file as equivalent airspeed, by the height above the sea where that is known."""
+    if "elevation_m" not in made.known:
+        made.repairs.append(airspeeds.AT_SEA_LEVEL)
+        return table["true_airspeed"]
+    made.repairs.append(airspeeds.BY_HEIGHT)
+    height_m = np.nan_to_num(table["height"]) if "height" in table else 0.0
+    return airspeeds.equivalent_m_s(table["true_airspeed"], made.known["elevation_m"].value + height_m)
 
 
 def _take_attitude(

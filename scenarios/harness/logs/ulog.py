@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from estimator.instruments import Known
 from estimator.interface import Array
-from scenarios.harness.logs import attitudes, foreign, px4, streams
+from scenarios.harness.logs import airspeeds, attitudes, foreign, px4, streams
 from scenarios.harness.logs.ardupilot import FLYING_M_S
 from scenarios.harness.logs.recorded import Kind, LogError, RecordedLog
 from scenarios.harness.logs.streams import NO_FIX, UNHEALTHY, Stream
@@ -76,7 +76,7 @@ class _Log:
             from pyulog import ULog  # type: ignore[import-untyped]
         except ImportError as error:
             raise LogError(f'{path}: logs of PX4 need pyulog: pip install "wingslevel[logs]"') from error
-        self.path = path
+        self.path, self.repairs = path, repairs
         try:
             raw = files.read(path, "ULog file")
             foreign.refuse(path, raw, "a ULog file of PX4 (.ulg)")
@@ -215,6 +215,7 @@ def _fixes(log: _Log) -> tuple[Stream | None, dict[str, Known | None]]:
         "gps_vertical_velocity": Known(False, "log", f"{name}.vel_d_m_s") if level else None,
         "gps_latency_s": px4.latency(log.parameters),
         "declination_rad": px4.declination(log.parameters, where, _year(topic)),
+        **airspeeds.elevation(altitude if len(usable) else None, f"altitude of {name}"),
     }
 
 
@@ -269,15 +270,21 @@ def _field(log: _Log) -> Stream | None:
 
 
 def _airspeed(log: _Log) -> Stream | None:
-    """True airspeed, or indicated airspeed if there is none."""
+    """Calibrated or indicated airspeed, which are equivalent; else the true one, converted by the height."""
     found = log.first("airspeed", "airspeed_validated")
     if found is None:
         return None
     name, topic = found
-    true = log.columns(name, topic, "true_airspeed_m_s")
-    if "indicated_airspeed_m_s" in topic:
-        true = np.where(np.isfinite(true), true, log.columns(name, topic, "indicated_airspeed_m_s"))
-    stream = Stream.of(name, _published_s(topic), true)
+    t_s = _published_s(topic)
+    fields = [f for f in ("calibrated_airspeed_m_s", "indicated_airspeed_m_s") if f in topic]
+    values = np.full((len(t_s), 1), np.nan)
+    for field in fields:
+        values = np.where(np.isfinite(values), values, log.columns(name, topic, field))
+    missing = ~np.isfinite(values)
+    if not fields or (missing.any() and "true_airspeed_m_s" in topic):
+        true = np.where(missing, log.columns(name, topic, "true_airspeed_m_s"), np.nan)
+        values = np.where(missing, _equivalent(log, t_s, true[:, 0])[:, None], values)
+    stream = Stream.of(name, t_s, values)
     if name != "airspeed_validated":
         confidence = topic.get("confidence", np.zeros(0))
         return stream.without(confidence == 0.0, UNHEALTHY) if np.any(confidence) else stream  # all 0: not filled in
@@ -285,6 +292,24 @@ def _airspeed(log: _Log) -> Stream | None:
         if source in topic:  # 0 or less: from the wind triangle or a model
             stream = stream.without(topic[source] < 1, NOT_MEASURED)
     return stream
+
+
+def _equivalent(log: _Log, t_s: Array, true_m_s: Array) -> Array:
+    """True airspeeds as equivalent ones: by the pressure altitude, or by the altitude of the fixes."""
+    if not np.isfinite(true_m_s).any():
+        return true_m_s
+    if (found := log.first("vehicle_air_data")) is not None:
+        at_s, height_m = _published_s(found[1]), log.columns(*found, "baro_alt_meter")[:, 0]
+    else:
+        fixes, _ = _fixes(log)
+        at_s, height_m = (np.zeros(0), np.zeros(0)) if fixes is None else (fixes.t_s, fixes.values[:, 2])
+    there = np.isfinite(at_s + height_m)
+    if not there.any():
+        log.repairs.append(airspeeds.AT_SEA_LEVEL)
+        return true_m_s
+    order = np.argsort(at_s[there], kind="stable")
+    log.repairs.append(airspeeds.BY_HEIGHT)
+    return airspeeds.equivalent_m_s(true_m_s, np.interp(t_s, at_s[there][order], height_m[there][order]))
 
 
 def _height(log: _Log) -> Stream | None:
