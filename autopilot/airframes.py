@@ -88,7 +88,7 @@ _GENTLE_LADY = AutopilotParams(
         throttle_per_height_1_m=0.0,
         throttle_least=0.0,
     ),
-    launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD),
+    launch=LaunchParams(climb_pitch_rad=_GLIDE_PITCH_RAD, alpha_rad=math.radians(8.5)),
     lift=LiftParams(incidence_per_elevator_rad=0.0),  # its glide pitch alone protects the speed
     mixer=MixerParams(elevator_trim=-0.12, rudder_per_roll=1.0, aileron_limit=0.0, throttle_limit=0.0),
     failsafe=FailsafeParams(

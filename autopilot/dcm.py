@@ -48,7 +48,7 @@ from autopilot.interface import (
     ActuatorCommand,
     Setpoint,
 )
-from autopilot.launch import climb_away, feel_throw
+from autopilot.launch import climb_away, feel_throw, reckon_throw, steepest_rate
 from autopilot.lift import feel_lift
 from autopilot.mixer import mix
 from autopilot.route import bank_along_route, bank_to_circle
@@ -93,7 +93,11 @@ _STATE = np.dtype(
         ("unseen_turn_rad", "f8"),  # turn not yet visible in the GPS course
         ("outbound", "i8"),  # flying away from the launch point after passing it
         ("felt_m_s2", "f8"),  # mean acceleration along the nose
-        ("thrown_s", "f8"),  # since the throw, -1 before it
+        ("gained_m_s", "f8"),  # speed along the nose gained by pushing, slowly forgotten
+        ("ahead_m_s", "f8"),  # velocity along the nose and below it, from the throw
+        ("below_m_s", "f8"),
+        ("peak_m_s2", "f8"),  # largest mean acceleration of the push
+        ("thrown_s", "f8"),  # since the end of the throw, 0 during its push, -1 before it
         ("levelled_off", "i8"),  # the climb after the throw has ended
         ("next_waypoint", "i8"),  # of the route
         ("on_leg", "i8"),  # flying towards it, from
@@ -137,6 +141,7 @@ def ask(mode, s):  # type: ignore[no-untyped-def]
     """Handle a new mode of the setpoint: each launch waits for a new throw."""
     if mode == LAUNCH:
         s.roll_integral = s.pitch_integral = s.felt_m_s2 = s.climb_integral_rad = s.throttle_integral = 0.0
+        s.gained_m_s = 0.0
         s.thrown_s = -1.0
         s.levelled_off = 0
     s.setpoint_mode = mode
@@ -235,10 +240,16 @@ def control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type: 
         throttle = me.p.energy.throttle_trim
     else:
         bank, pitch, throttle = guide(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
-        throttle = throttle_to_recover(R_eb[2, 0], pitch, throttle)
+        gathers_speed = s.mode == LAUNCH and s.thrown_s < me.p.launch.full_throttle_s
+        if gathers_speed:
+            reckon_throw(R_eb, omega_b_rad_s, row, s, me.p, dt_s)
+        else:
+            throttle = throttle_to_recover(R_eb[2, 0], pitch, throttle)
         up = -1.0 if s.inverted else 1.0
         demand = rate_demand(R_eb, omega_b_rad_s, bank, pitch, up, s.true_factor * s.airspeed_m_s, me.p.stabilise)
-    in_hand = s.mode == LAUNCH and s.thrown_s < 0.0
+        if gathers_speed:
+            demand = (demand[0], min(demand[1], steepest_rate(R_eb, row, s, me.p.launch)), demand[2])
+    in_hand = s.mode == LAUNCH and s.thrown_s < me.p.launch.motor_delay_s
     still_s = 0.0 if in_hand else dt_s
     moved = rate_control(demand, R_eb, omega_b_rad_s, s.airspeed_m_s, s.true_factor, s, me.p.stabilise, still_s)
     if math.isfinite(setpoint.throttle) and s.mode == setpoint.mode and setpoint.radio and not in_hand:

@@ -257,7 +257,7 @@ def mode_in_force(setpoint, height_m, row, s, p, dt_s):  # type: ignore[no-untyp
     s : record with the results of `listen` and `examine`; updates `low`, `circled_s`, `fenced` and others
     """
     mode, f = led_by(setpoint, s), p.failsafe
-    in_hand = mode == LAUNCH and s.thrown_s < 0.0
+    in_hand = mode == LAUNCH and s.thrown_s <= 0.0
     s.unheard_s = 0.0 if setpoint.radio or in_hand else s.unheard_s + dt_s
     if mode in (MANUAL, RATE):
         return mode, mode

@@ -20,7 +20,8 @@ _UNITS = (
     ("mv_g", "mV/g"), ("_deg_s_g", "deg/s/g"), ("_deg_s", "deg/s"), ("_rad_s", "rad/s"), ("_m_s2", "m/s2"),
     ("_m_s", "m/s"), ("_deg", "deg"), ("_hz", "Hz"), ("_hpa", "hPa"), ("_pa_min", "Pa/min"),
     ("_pa", "Pa"), ("_ut", "uT"), ("_ug", "ug"),
-    ("_mg", "mg"), ("_rpm", "rpm"), ("_m", "m"), ("_g", "g"), ("_s", "s"), ("_k", "K"), ("_v", "V"),
+    ("_mg", "mg"), ("_rpm", "rpm"), ("_m", "m"), ("_g", "g"), ("_s", "s"), ("_k", "K"), ("_v", "V"), ("_mah", "mAh"),
+    ("_ohm", "ohm"),
     ("bits", "bit"),
 )  # fmt: skip
 

@@ -25,7 +25,7 @@ class Conditions(TypedDict, total=False):
     thermals : how many around the launch point
     aircraft, autopilot : by name        sensors : name of a suite, or a ``suite.toml``
     gps_rate, imu_rate : Hz; the inertial sensors, the estimator and the autopilot run at `imu_rate`
-    faults : ``"gyro.x:stuck@20-25"``, times in seconds after the release; one or several
+    faults : ``"gyro.x:stuck@20-25"``, ``"motor:dead@30"``, times in seconds after the release; one or several
     duration : seconds after the release
     withhold : properties of the instruments that flight code is not given; ``"all"`` for all of them
     settings : any other parameter by its dotted name, ``{"gps.latency_s": 0.5}``; see ``--set`` of the command

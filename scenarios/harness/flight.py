@@ -156,7 +156,7 @@ def _prepare(
     if config.aircraft not in aircraft():
         raise ValueError(f"unknown aircraft {config.aircraft!r}: {near_misses(config.aircraft, aircraft())}")
     config = resolve(config, suite)
-    require_sound(config.airframe, config.aircraft, config.rates.build().physics_hz, config.flies)
+    require_sound(config)
     instruments = instruments_of(config, suite)
     estimator, config = equipped_estimator(config, suite, instruments, maker)
     reference = heading_reference_of(estimator.code)

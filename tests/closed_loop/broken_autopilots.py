@@ -108,6 +108,15 @@ class RudderStuck(DcmAutopilot):
         return super().update(estimate, m, setpoint)._replace(rudder=0.0)
 
 
+class IgnoresTheElevator(DcmAutopilot):
+    """Does not notice by its elevator that it is slow."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        params = params_of(aircraft)
+        numb = replace(params, lift=replace(params.lift, incidence_per_elevator_rad=0.0))
+        super().__init__(numb, heading_reference, aircraft)
+
+
 class NeverTrims(DcmAutopilot):
     """Learns no deflection that holds an attitude: without the integrals of the rate errors."""
 

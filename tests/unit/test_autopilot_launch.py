@@ -51,6 +51,18 @@ def feel(forces_x, R_eb):
     return None
 
 
+def motor_on(forces_x, R_eb):
+    """Tick at which the motor may start, or None."""
+    s, p = np.zeros(1, _STATE)[0], record("launch", PARAMS)
+    s["thrown_s"] = -1.0
+    row = np.zeros(1, MEASURED_DTYPE)[0]
+    for k, force_x in enumerate(forces_x):
+        row["force_b_m_s2"] = (force_x, 0.0, -G_M_S2)
+        if feel_throw(R_eb, row, s, p, DT_S) >= PARAMS.motor_delay_s:
+            return k
+    return None
+
+
 def pitched(degrees):
     return Rotation.from_euler("Y", degrees, degrees=True).as_matrix()
 
@@ -79,6 +91,50 @@ def test_feel_throw_push_of_2_75_g_is_felt_within_a_tenth_of_a_second(pitch_deg)
     assert ticks * DT_S <= 0.1
 
 
+@pytest.mark.parametrize(
+    ("push_m_s2", "push_s"),
+    [(6.0, 2.0), (6.0, 0.8), (8.0, 0.6), (10.0, 0.8), (10.0, 2.0), (27.0, 0.3), (40.0, 0.1), (40.0, 2.0)],
+)
+@pytest.mark.parametrize("pitch_deg", [0.0, 15.0])
+def test_feel_throw_motor_waits_for_the_end_of_the_push_and_no_longer(push_m_s2, push_s, pitch_deg):
+    """Of any length and strength, also beyond the full scale of 3 g; afterwards drag slows it down a little."""
+    at_rest = G_M_S2 * math.sin(math.radians(pitch_deg))
+    push = min(push_m_s2 + at_rest, 3.0 * G_M_S2)
+    n = round(push_s / DT_S)
+    noise = np.random.Generator(np.random.PCG64(2)).normal(0.0, 0.5, 50 + n + 25)
+    on = motor_on(np.array([at_rest] * 50 + [push] * n + [-1.5] * 25) + noise, pitched(pitch_deg))
+    assert on is not None
+    assert 0 < on - (50 + n) <= 5
+
+
+def test_feel_throw_push_that_falters_goes_on():
+    """A dip of one sample in the push is not its end."""
+    forces = [0.0] * 10 + [20.0] * 10 + [2.0] + [20.0] * 10 + [-1.0] * 10
+    assert motor_on(forces, np.eye(3)) > 31
+
+
+@pytest.mark.parametrize("hz", [0.8, 1.0, 2.0, 3.0])
+def test_feel_throw_waved_along_the_nose_does_not_start_the_motor(hz):
+    """Waved with up to 1.7 m/s, at most 1.2 g, from rest: each swing ends in a swing back."""
+    t_s = np.arange(200) * DT_S
+    w = 2.0 * math.pi * hz
+    forces = min(1.7 * w, 1.2 * G_M_S2) * np.cos(w * t_s) * np.minimum(t_s, 1.0)
+    assert motor_on(forces, np.eye(3)) is None
+
+
+@pytest.mark.parametrize("then_m_s2", [0.0, -6.0])
+def test_feel_throw_in_a_car_does_not_start_the_motor(then_m_s2):
+    """6 s at 3 m/s2, then it cruises or brakes."""
+    assert motor_on([3.0] * 300 + [then_m_s2] * 100, np.eye(3)) is None
+
+
+def test_feel_throw_slowed_down_after_the_push_is_still_in_the_hand():
+    """A push of 4 m/s and a stop by the same hand; a throw afterwards counts."""
+    stopped = [0.0] * 10 + [20.0] * 10 + [-20.0] * 10 + [0.0] * 50
+    assert motor_on(stopped, np.eye(3)) is None
+    assert motor_on([*stopped, *[27.0] * 15, *[-1.0] * 10], np.eye(3)) == 96
+
+
 def test_climb_away_follows_the_throw_from_no_power_to_the_height():
     """Motor off in the hand, then full, then that of the climb, which ends below the height for good."""
     s, p = cruising(), everything()
@@ -90,7 +146,9 @@ def test_climb_away_follows_the_throw_from_no_power_to_the_height():
         return climb_away(thrown_s, 50.0, row, s, p, DT_S)
 
     assert at(-1.0, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
-    assert at(0.05, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
+    assert at(0.0, 1.7) == (PARAMS.climb_pitch_rad, 0.0)
+    assert at(0.02, 60.0) == (PARAMS.climb_pitch_rad, 0.0)  # above the height already: still no power
+    assert s["levelled_off"] == 0
     assert at(0.3, 1.7) == (PARAMS.climb_pitch_rad, 1.0)
     assert at(PARAMS.full_throttle_s, 20.0) == (
         PARAMS.climb_pitch_rad,

@@ -479,7 +479,7 @@ def test_launch_without_any_fix_climbs_for_a_time_circles_and_glides():
     modes = aboard.modes(launch, 80.0, gps=False)
     assert [m for m, _ in modes] == [Mode.LAUNCH, Mode.CIRCLE, Mode.GLIDE]
     climb_m_s = EnergyParams().airspeed_m_s * math.sin(math.radians(12.0) - EnergyParams().pitch_trim_rad)
-    np.testing.assert_allclose(modes[0][1], P.blind_climb * 30.0 / climb_m_s - 1.0, rtol=0, atol=1.0)
+    np.testing.assert_allclose(modes[0][1], P.blind_climb * 30.0 / climb_m_s, rtol=0, atol=1.0)
     np.testing.assert_allclose(modes[1][1], P.circle_s, rtol=0, atol=2 * DT_S)
     assert aboard.modes(launch, 1.0) == [(Mode.LAUNCH, 1.0)]
 

@@ -112,6 +112,7 @@ def test_manifest_holds_what_was_drawn_and_repeats_the_flight():
         ("circle", {"tolerances.mass": "5"}, "tolerances.mass = 5: must be at most 0.3"),
         ("circle", {"airframe.cg_aft": "0.3"}, "airframe.cg_aft = 0.3: diverges in pitch, its static margin is"),
         ("circle", {"airframe.mass_factor": "4"}, "airframe.mass_factor = 4: cannot fly at its cruise speed"),
+        ("circle", {"airframe.mass_factor": "2.5", "place.elevation_m": "4000"}, "airframe.mass_factor = 2.5: cannot"),
         ("bench_rest", {"airframe.cg_aft": "0.01"}, "airframe: the flight is on a table"),
         ("gentle_lady_return", {"airframe.thrust_factor": "0.9"}, "'gentle_lady' has no motor"),
     ],

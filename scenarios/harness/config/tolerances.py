@@ -7,7 +7,7 @@ for each flight.  A difference that is set is not drawn.  The autopilot always h
 import math
 from collections.abc import Mapping
 from statistics import NormalDist
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -17,6 +17,9 @@ from sim.aeroplane.built import AS_DRAWN, AsBuilt, drawn_inertia_kg_m2, has_moto
 from sim.outside.wording import brief
 from sim.params import near_misses
 from sim.rng import stream
+
+if TYPE_CHECKING:
+    from scenarios.harness.config.flight import FlightConfig
 
 MOST_SIGMA = 2.0  # beyond which nothing is drawn: a builder would have noticed
 Chance = Literal["random"]
@@ -127,15 +130,15 @@ class _Alone(_Model):
     airframe: AirframeConfig
 
 
-def require_sound(airframe: AirframeConfig, aircraft: str, physics_hz: int, flies: bool) -> None:
+def require_sound(config: "FlightConfig") -> None:
     """ValueError in one line if the aeroplane of a resolved configuration cannot fly, or does not leave its table."""
     from sim.aeroplane.jsbsim_model import Model  # takes long to load, and is needed here only for a difference
 
-    as_built = built(airframe)
+    as_built = built(config.airframe)
     if as_built != AS_DRAWN:
-        if not flies:
+        if not config.flies:
             raise ValueError("airframe: the flight is on a table, where it changes nothing; leave it as it is")
-        require_flyable(Model(aircraft, physics_hz, as_built))
+        require_flyable(Model(config.aircraft, config.rates.build().physics_hz, as_built, config.place.build()))
 
 
 def _normal(rng: np.random.Generator) -> float:
