@@ -272,7 +272,7 @@ def mode_in_force(setpoint, height_m, row, s, p, dt_s):  # type: ignore[no-untyp
         return mode, mode
     if s.unheard_s > f.return_s and navigates:
         return GLIDE, GLIDE
-    guarded = navigates or mode == STABILISE or (mode == LAUNCH and height_m > f.safe_height_m)
+    guarded = navigates or mode == STABILISE or (mode == LAUNCH and not in_hand and height_m > f.safe_height_m)
     if guarded and mode != RETURN and s.heard_s >= f.gps_back_s:
         mind_fence(row, height_m, s, p.fence, p.guidance, p.energy.airspeed_m_s)
         if s.fenced:

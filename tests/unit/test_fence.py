@@ -122,8 +122,8 @@ def test_fence_overrides_all_but_sticks_and_return(mode):
 def test_fence_ends_the_climb_of_a_launch_above_a_safe_height():
     """In the hand and low above the ground it goes on; at 40 m it turns back."""
     autopilot, launch = fenced(), Setpoint(Mode.LAUNCH, height_m=100.0)
-    assert mode_at(autopilot, 350.0, height_m=1.7, setpoint=launch) == Mode.LAUNCH
-    autopilot._memory["s"]["thrown_s"] = 0.0
+    assert mode_at(autopilot, 350.0, height_m=40.0, setpoint=launch) == Mode.LAUNCH
+    autopilot._memory["s"]["thrown_s"] = 1.0
     assert mode_at(autopilot, 350.0, height_m=20.0, setpoint=launch) == Mode.LAUNCH
     assert mode_at(autopilot, 350.0, height_m=40.0, setpoint=launch) == Mode.RETURN
 
