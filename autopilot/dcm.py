@@ -19,6 +19,7 @@ from autopilot.energy import (
 )
 from autopilot.failsafe import circle, end_blind_climb, examine, listen, mode_in_force
 from autopilot.fence import FenceParams, ceiling
+from autopilot.fixes import take_in
 from autopilot.guidance import (
     agility,
     bank_for_heading,
@@ -27,6 +28,7 @@ from autopilot.guidance import (
     gps_age,
     heading_error,
     height,
+    turn_rate,
     unseen_turn,
     way_wanted,
 )
@@ -53,9 +55,10 @@ from autopilot.lift import feel_lift
 from autopilot.mixer import mix
 from autopilot.route import bank_along_route, bank_to_circle
 from autopilot.stabilise import rate_control, rate_demand
+from estimator.blocks.gps_integrity import WATCH
 from estimator.blocks.kernels import clip
 from estimator.compiler.jit import kernel
-from estimator.interface import AttitudeEstimate, HeadingReference, Measurements
+from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, HeadingReference, Measurements
 
 
 def _floats(params: type[Any]) -> np.dtype[Any]:
@@ -126,11 +129,15 @@ _STATE = np.dtype(
         ("force_last_b_m_s2", "f8", (3,)),  # last specific force
         ("force_frozen_s", "f8"),  # time for which it has not changed
         ("height_kept_m", "f8"),  # at the start of LEVEL
+        ("fix_held_back", "i8"),  # the last fix cannot be true
+        *((c.name, "i8" if c.integer else "f8", c.shape) for c in WATCH),
     ],
     align=True,
 )
 # One array with everything the kernel needs besides the inputs of a tick: each array argument costs time per call.
-_MEMORY = np.dtype([("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8")], align=True)
+_MEMORY = np.dtype(
+    [("p", _PARAMS), ("setpoint", _SETPOINT), ("s", _STATE), ("on_nose", "i8"), ("seen", MEASURED_DTYPE)], align=True
+)
 
 _WIND_UNKNOWN = np.full(3, np.nan)
 _DT_LIMIT_S = 0.1  # longer sample intervals are gaps and are not integrated in full
@@ -291,7 +298,9 @@ def steer(R_eb, omega_b_rad_s, gyro_bias_b_rad_s, wind_e_m_s, health, rows, k, m
     rows, k : measured log and its row   memory : shape (1,), parameters, setpoint and state
     """
     me = memory[0]
-    setpoint, s, p, row = me.setpoint, me.s, me.p, rows[k]
+    setpoint, s, p, row = me.setpoint, me.s, me.p, me.seen
+    turning = turn_rate(R_eb, omega_b_rad_s) if s.believed else turn_rate(s.R_kept_eb, s.omega_kept_b_rad_s)
+    take_in(rows[k], turning, row, s)
     known = math.isfinite(row.dt_s)
     dt_s = clip(row.dt_s, 0.0, _DT_LIMIT_S) if known else 0.0
     for i in range(3):
@@ -369,6 +378,7 @@ class DcmAutopilot:
         for group in _GROUPS:
             me["p"][group] = astuple(getattr(self.params, group))
         me["s"]["mode"] = me["s"]["setpoint_mode"] = me["s"]["led_by"] = me["s"]["thrown_s"] = -1
+        me["s"]["placed"] = 1  # unlike an estimator, it needs a position
         me["s"]["believed"], me["s"]["heard_s"], me["s"]["R_kept_eb"] = 1, math.inf, np.eye(3)
         me["s"]["true_factor"] = 1.0
         me["on_nose"] = self.heading_reference == "nose"

@@ -53,7 +53,9 @@ class EnergyParams:
     gain_per_speed_1_s, gain_limit_m_s2 : acceleration demand per speed error (1/s), and its limit (m/s2) (default 0.3
         and 1.5).  Higher: holds speed more tightly, height less
     height_weight : 1 - w, share of the pitch that holds height (default 0.5).  Higher: height first; 0: speed only
-    climb_per_margin_1_s : climb allowed per speed above `least_airspeed` (1/s, default 3).  Lower: more protection
+    climb_per_margin_1_s, climb_per_rough_margin_1_s : climb allowed per speed above `least_airspeed`, measured, and
+        from the elevator (1/s, default 3 and 2).  Lower: more protection, and climbs less steeply when slow; higher:
+        surges
     recovery_sink_m_s : sink demand at `least_airspeed` (m/s, default 1).  Higher: faster recovery, more height lost
     pitch_trim_rad : pitch in level flight at cruise (rad, default 1 deg).  Higher: climbs until learnt
     pitch_limit_rad : largest pitch demand (rad, default 15 deg).  Higher: steeper, nearer the stall
@@ -89,6 +91,7 @@ class EnergyParams:
     gain_limit_m_s2: float = 1.5
     height_weight: float = 0.5
     climb_per_margin_1_s: float = 3.0
+    climb_per_rough_margin_1_s: float = 2.0
     recovery_sink_m_s: float = 1.0
     pitch_trim_rad: float = math.radians(1.0)
     pitch_limit_rad: float = math.radians(15.0)
@@ -107,7 +110,7 @@ class EnergyParams:
 
 SLOWEST, FASTEST = 0.6, 1.6  # range of a plausible airspeed over cruise
 STALL_MARGIN = 1.2
-TURN_MARGIN = 1.1
+TURN_MARGIN = 1.15
 
 
 @kernel
@@ -218,12 +221,18 @@ def least_airspeed(s, e):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def by_elevator(s):  # type: ignore[no-untyped-def]
+    """Whether the guards against a stall use the airspeed from the elevator."""
+    return s.lift_m_s > 0.0 and not (s.airspeed_known and s.air_left_s > 0.0)
+
+
+@kernel
 def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
     """The airspeed of the guards against a stall, m/s; infinite if unknown.
 
     Measured, or from the elevator (`autopilot.lift`), or from the estimated wind, which is late and may be wrong.
     """
-    if s.lift_m_s > 0.0 and not (s.airspeed_known and s.air_left_s > 0.0):
+    if by_elevator(s):
         return s.lift_m_s
     return s.airspeed_m_s if s.airspeed_known else math.inf
 
@@ -234,12 +243,13 @@ def most_climb(s, e):  # type: ignore[no-untyped-def]
 
     s : record with `airspeed_m_s`, `airspeed_known`, `lift_m_s`   e : record of EnergyParams
     """
-    return e.climb_per_margin_1_s * (airspeed_to_protect(s) - least_airspeed(s, e)) - e.recovery_sink_m_s
+    gain_1_s = e.climb_per_rough_margin_1_s if by_elevator(s) else e.climb_per_margin_1_s
+    return gain_1_s * (airspeed_to_protect(s) - least_airspeed(s, e)) - e.recovery_sink_m_s
 
 
 @kernel
 def steepest_bank(s, e):  # type: ignore[no-untyped-def]
-    """Largest bank, rad, of a level turn 10 % above its stalling speed, which grows with 1 / sqrt(cos bank)."""
+    """Largest bank, rad, of a level turn 15 % above its stalling speed, which grows with 1 / sqrt(cos bank)."""
     slowest_m_s = TURN_MARGIN * (e.inverted_stall_m_s if s.inverted else e.stall_m_s)
     return math.acos(min((slowest_m_s / airspeed_to_protect(s)) ** 2, 1.0))
 

@@ -37,11 +37,11 @@ The estimator is not trusted once it has been POOR for `unhealthy_s` while the G
 its vertical is then `apart_rad` or more from the standby attitude, or if it is no number, for `apart_s`; until it has
 been GOOD for `unhealthy_s`.
 
-The GPS counts as working while fixes arrive, even if they are 12 s late.  An estimator that is POOR for lack of fixes
-is handled by CIRCLE; one that was never healthy leaves no attitude to fall back on, and is flown on as it is; if it is
-no number, controls are neutral and the motor is off.  One that reports GOOD is trusted, whatever it reports.  After a
-failsafe the commanded mode continues where it was: a detected throw stays detected, a route continues to its next
-waypoint.
+The GPS counts as working while fixes arrive, even if they are 12 s late; a fix that cannot be true is none, see
+`estimator.blocks.gps_integrity`.  An estimator that is POOR for lack of fixes is handled by CIRCLE; one that was never
+healthy leaves no attitude to fall back on, and is flown on as it is; if it is no number, controls are neutral and the
+motor is off.  One that reports GOOD is trusted, whatever it reports.  After a failsafe the commanded mode continues
+where it was: a detected throw stays detected, a route continues to its next waypoint.
 
 No row lasts for ever without somebody who can end it.  Without a radio link, RETURN ends in GLIDE, and so does CIRCLE;
 LEVEL ends in LAND.  With it, the pilot can: by any mode, in LEVEL by MANUAL or RATE.  A LAUNCH without a height ends by
@@ -131,7 +131,8 @@ class FailsafeParams:
 def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Update the GPS status: time without fixes, and time since the last outage.
 
-    row : measured   s : record with `fixed`, `silent_s`, `heard_s`, `circled_s`, updated   p : record of FailsafeParams
+    row : measured   p : record of FailsafeParams
+    s : record with `gps_lost`, `clear_s`; `fixed`, `silent_s`, `heard_s`, `circled_s` are updated
     """
     arrived = row.gps_new != 0 and is_fix(row)
     if row.gps_valid != 0:
@@ -139,7 +140,9 @@ def listen(row, s, p, dt_s):  # type: ignore[no-untyped-def]
     s.silent_s = 0.0 if arrived or row.gps_valid == 0 else s.silent_s + dt_s
     heard = s.heard_s >= p.gps_back_s
     patience_s = p.gps_lost_s if heard else 0.5 * p.gps_lost_s
-    s.heard_s = 0.0 if s.silent_s > patience_s else s.heard_s + dt_s
+    s.heard_s = 0.0 if s.gps_lost or s.silent_s > patience_s else max(s.heard_s, s.clear_s) + dt_s
+    if not s.gps_lost:
+        s.clear_s = 0.0  # already counted
     if heard and s.fixed:
         s.circled_s = 0.0
 

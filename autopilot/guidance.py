@@ -84,12 +84,15 @@ def unit(north, east):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def unseen_turn(unseen_rad, R_eb, omega_b_rad_s, lag_s, dt_s):  # type: ignore[no-untyped-def]
-    """Turn angle not yet visible in a GPS course that lags by `lag_s`, after one tick, rad.
+def turn_rate(R_eb, omega_b_rad_s):  # type: ignore[no-untyped-def]
+    """Rate about the vertical, rad/s: the third row of the matrix times the gyro vector (the paper's point 5)."""
+    return R_eb[2, 0] * omega_b_rad_s[0] + R_eb[2, 1] * omega_b_rad_s[1] + R_eb[2, 2] * omega_b_rad_s[2]
 
-    The rate about the vertical is the third row of the matrix times the gyro vector (the paper's point 5).
-    """
-    turning = R_eb[2, 0] * omega_b_rad_s[0] + R_eb[2, 1] * omega_b_rad_s[1] + R_eb[2, 2] * omega_b_rad_s[2]
+
+@kernel
+def unseen_turn(unseen_rad, R_eb, omega_b_rad_s, lag_s, dt_s):  # type: ignore[no-untyped-def]
+    """Turn angle not yet visible in a GPS course that lags by `lag_s`, after one tick, rad."""
+    turning = turn_rate(R_eb, omega_b_rad_s)
     return clip(unseen_rad + dt_s * (turning - unseen_rad / lag_s), -math.pi, math.pi)
 
 

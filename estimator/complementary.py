@@ -28,7 +28,7 @@ import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip
-from estimator.blocks.screening import AT_LIMIT_S, FORCE_GOOD, GPS, refuse, screen, take_rate, watch_limit
+from estimator.blocks.screening import AT_LIMIT_S, FORCE_GOOD, GPS, fix_came, refuse, screen, take_rate, watch_limit
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Column, ImuSample
 from estimator.params.shared import Params
@@ -79,7 +79,7 @@ STATE_DTYPE = state_dtype(
 def take_fix(row, s):  # type: ignore[no-untyped-def]
     """Keep the velocity of a fix that arrived; reject one that cannot be true."""
     s.fix_age_s += s.dt_s
-    if row.gps_new:
+    if fix_came(row, s):
         v = row.gps_v_e_m_s
         if abs(v[0]) < FASTEST_M_S and abs(v[1]) < FASTEST_M_S and abs(v[2]) < FASTEST_M_S:  # NaN is not
             s.v_e_m_s[0], s.v_e_m_s[1], s.v_e_m_s[2], s.fix_age_s = v[0], v[1], v[2], 0.0

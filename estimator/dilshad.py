@@ -58,7 +58,7 @@ from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import cross, dot, put, wrap
 from estimator.blocks.magnetometer import FIELD, take_field, turn_to_north
 from estimator.blocks.pi import corrected_rate, feed_back, weigh
-from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen, watch_limit
+from estimator.blocks.screening import FORCE_GOOD, GPS, fix_came, health_of, refuse, screen, watch_limit
 from estimator.compiler.jit import kernel
 from estimator.interface import Array, Column, HeadingReference, ImuSample
 from estimator.params.dilshad import DilshadParams as DilshadParams
@@ -147,7 +147,7 @@ def take_course(row, s):  # type: ignore[no-untyped-def]
     s.turned_rad += dt * rate - min(dt / s.gps_lag_s, 1.0) * s.turned_rad
     s.p_age_s[0] += dt
     s.p_age_s[1] += dt
-    if not row.gps_new:
+    if not fix_came(row, s):
         return
     x, y = row.gps_p_e_m[0], row.gps_p_e_m[1]
     if not (abs(x) < 1e6 and abs(y) < 1e6 and 0.0 <= row.gps_speed_m_s < 1000.0):

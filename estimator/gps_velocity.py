@@ -45,7 +45,7 @@ from estimator.blocks.gyro_frame import (
 from estimator.blocks.kernels import cross, dot, put
 from estimator.blocks.magnetometer import FIELD, take_field
 from estimator.blocks.pi import feed_back
-from estimator.blocks.screening import GPS, health_of, refuse, screen, take_rate, watch_limit
+from estimator.blocks.screening import GPS, fix_came, health_of, refuse, screen, take_rate, watch_limit
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
@@ -145,13 +145,12 @@ def roll_pitch_at_fix(s, dv_e_m_s):  # type: ignore[no-untyped-def]
 def stand_in(s):  # type: ignore[no-untyped-def]
     """The roll-pitch correction of 2009 (Eqns 25 to 27), over the time since it was last computed.
 
-    Integrated, omega x V is the speed times the change of the nose.
+    Integrated, omega x V is the speed times the change of the nose.  The speed is that of the last fix, however old:
+    a speed of zero would let every turn without a GPS look level, and a circle become a spiral.
     """
     apply_corrections(s)
     interval_s = s.clock_s - s.stand_in_t_s
-    speed = 0.0
-    if s.fix_age_s <= LOCK_LIFE_S:
-        speed = np.hypot(s.air_m_s[0], s.air_m_s[1]) if s.wind_known else np.hypot(s.v_e_m_s[0], s.v_e_m_s[1])
+    speed = np.hypot(s.air_m_s[0], s.air_m_s[1]) if s.wind_known else np.hypot(s.v_e_m_s[0], s.v_e_m_s[1])
     for i in range(3):
         felt, nose = s.felt_g_m_s[i], s.R_gb[i, 0]
         s.error_e[i] = felt - s.stand_in_g[i] + speed * (nose - s.stand_in_g[3 + i])  # Eqns 25 and 26
@@ -265,7 +264,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         attitude(s)
         watch_limit(s.omega_i_b, s.offset_limit_rad_s, s)
         s.fix_age_s += s.dt_s
-        if row.gps_new:
+        if fix_came(row, s):
             take_fix(row, s)
         if s.yaw_reference == MAGNETOMETER:
             take_mag(row, s)

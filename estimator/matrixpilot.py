@@ -54,7 +54,7 @@ import numpy as np
 
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip, cross, put, wrap
-from estimator.blocks.screening import FORCE_GOOD, GPS, health_of, refuse, screen, take_rate, watch_limit
+from estimator.blocks.screening import FORCE_GOOD, GPS, fix_came, health_of, refuse, screen, take_rate, watch_limit
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, Column, ImuSample
 from estimator.params.matrixpilot import CLASSIC as CLASSIC
@@ -228,7 +228,9 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
         s.fixes = s.pair_begun = 0
         s.near_s = s.forward_m_s2 = 0.0
         s.yaw_b[0] = s.yaw_b[1] = s.yaw_b[2] = 0.0
-    if not row.gps_new:
+    if not fix_came(row, s):
+        if row.gps_new:  # nor can the correction that is held from the last one be trusted
+            s.forward_m_s2 = s.yaw_b[0] = s.yaw_b[1] = s.yaw_b[2] = 0.0
         return
     course, speed, sink, down = row.gps_course_rad, row.gps_speed_m_s, row.gps_v_e_m_s[2], row.gps_p_e_m[2]
     vertical = abs(down) < 1e6 if s.climb_from_height else abs(sink) < 1000.0

@@ -70,7 +70,7 @@ from estimator.blocks.gps_lag import (
 )
 from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
-from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen, watch_limit
+from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, fix_came, health_of, refuse, screen, watch_limit
 from estimator.blocks.wind import WIND_FILTER, learn_wind
 from estimator.compiler.jit import inlined, kernel
 from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
@@ -123,7 +123,7 @@ def take_air(row, s):  # type: ignore[no-untyped-def]
 def take_fix(row, s):  # type: ignore[no-untyped-def]
     """Take a fix that arrived, if it is plausible."""
     s.fix_age_s += s.dt_s
-    if row.gps_new:
+    if fix_came(row, s):
         if abs(row.gps_course_rad) < 100.0 and 0.0 <= row.gps_speed_m_s < 1000.0:
             believe_fix(row.gps_course_rad, row.gps_speed_m_s, s)
         else:

@@ -39,7 +39,7 @@ from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.magnetometer import FIELD, take_field
-from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, health_of, refuse, screen, take_rate
+from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, fix_came, health_of, refuse, screen, take_rate
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
 from estimator.params.ap_dcm import AP_DCM_2013, MOST_FIXES, ApDcmParams, Quirk
@@ -104,7 +104,7 @@ def take_arrivals(row, s):  # type: ignore[no-untyped-def]
     s.field_age_s += s.dt_s
     s.air_age_s += s.dt_s
     s.new_fix = 0
-    if row.gps_new:
+    if fix_came(row, s):
         v, course, speed = row.gps_v_e_m_s, row.gps_course_rad, row.gps_speed_m_s
         moving = abs(v[0]) < 1000.0 and abs(v[1]) < 1000.0 and abs(v[2]) < 1000.0  # NaN is not
         if moving and abs(course) < 100.0 and 0.0 <= speed < 1000.0:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.blocks.gps_integrity import WATCH, fix_is_sound
 from estimator.compiler.jit import inlined
 from estimator.interface import G_M_S2, GOOD, POOR, STARTING, Array, Column, ImuSample
 from estimator.rotation import from_euler
@@ -42,6 +43,7 @@ SCREEN = (
     Column("at_limit_s", (), "how long what is learnt has been at its limit"),
     Column("spoilt", (), "1 if this tick is already counted there", integer=True),
     Column("refused", (len(REFUSED),), "rejected samples by instrument, see REFUSED", integer=True),
+    *WATCH,
 )
 
 
@@ -116,6 +118,18 @@ def screen(row, s):  # type: ignore[no-untyped-def]
         else:
             refuse(s, FORCE)
     return good
+
+
+@inlined
+def fix_came(row, s):  # type: ignore[no-untyped-def]
+    """Whether a fix arrived in `row` that can be true, see `gps_integrity`; counts a rejection."""
+    if not row.gps_new:
+        return False
+    down, rate = s.R_eb[2], s.omega_b_rad_s
+    if fix_is_sound(row, down[0] * rate[0] + down[1] * rate[1] + down[2] * rate[2], s):
+        return True
+    refuse(s, GPS)
+    return False
 
 
 @inlined

@@ -64,6 +64,7 @@ from estimator.blocks.screening import (
     GPS,
     GYRO_GOOD,
     airspeed_came,
+    fix_came,
     refuse,
     screen,
     watch_limit,
@@ -261,7 +262,7 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     good = screen(row, s)
     if good:
         push(row, s, good)
-        if row.gps_new:
+        if fix_came(row, s):
             attach_fix(row, s)
         attach_others(row, s)
         turn_on(s, (s.oldest + s.waiting - 1) % SIZE)

@@ -16,6 +16,7 @@ from estimator.blocks.screening import (
     GPS,
     SCREEN,
     attitude_at_rest,
+    fix_came,
     offset_at_rest,
     refusals,
     refuse,
@@ -72,7 +73,7 @@ def _screen(rows, k, uses_field, uses_course, state):  # type: ignore[no-untyped
     if uses_field and take_field(row, s):
         good |= FIELD
     s.course_age_s += s.dt_s
-    if uses_course and row.gps_new:
+    if uses_course and fix_came(row, s):
         if not (abs(row.gps_course_rad) < 100.0 and 0.0 <= row.gps_speed_m_s < 1000.0):
             refuse(s, GPS)
         elif row.gps_speed_m_s >= MIN_SPEED_M_S:

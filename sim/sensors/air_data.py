@@ -78,8 +78,8 @@ class BarometerParams:
     lag_s : time constant of the lag of the height (s, default 0)
     noise_pa : sigma of each sample (Pa, default 0)
     drift_pa_min : sigma of the drift with weather and temperature at power-up (Pa per minute, default 0)
-    drift_s : time constant with which that levels off (s, default 36000, an assumption: 1 Pa per minute, or 1.8 hPa in
-        three hours, then ends at 6 hPa, as the weather of a season scatters).  Higher: it goes on for longer
+    drift_s : time constant with which that levels off (s, default 36000).  Higher: it goes on for longer.  An
+        assumption: 1 Pa per minute, or 1.8 hPa in three hours, ends at 6 hPa, as the weather of a season scatters
     wander_pa : sigma of the correlated error (Pa, default 0)
     wander_s : correlation time of that error (s, default 30).  Higher: averages out more slowly
     range_pa : full scale, from 0 (Pa, default inf: none).  Below the pressure on the ground: saturates there

@@ -38,8 +38,8 @@ class GyroParams:
     bias_deg_s : sigma of the turn-on bias, constant in a flight (deg/s, default 1)
     bias_per_k_deg_s : sigma of the bias change with temperature (deg/s per kelvin, default 0)
     bias_instability_deg_s : flicker noise, coefficient B of IEEE Std 952; Allan deviation 0.664 B (deg/s, default 0)
-    drift_deg_s_min : sigma of the bias drift per minute at power-up; it levels off with `board.warming_s`, at that
-        many minutes of it: 1 deg/s (deg/s per minute, default 0.2)
+    drift_deg_s_min : sigma of the slope of the bias drift at power-up, which levels off: in the end the bias has moved
+        by this times `board.warming_s`, 1 deg/s (deg/s per minute, default 0.2)
     walk_deg_s_sqrt_s : rate random walk, sigma of the bias after 1 s (deg/s per root second, default 0.01)
     noise_density_deg_s_sqrt_hz : one-sided white noise density, as in data sheets (deg/s per root Hz, default 0.06)
     gain : sigma of the relative gain error (fraction, default 0.015)

@@ -58,6 +58,15 @@ class LooksAtTheFenceTooLate(DcmAutopilot):
         super().__init__(params_of(aircraft), heading_reference, aircraft, replace(fence, ahead_s=0.0))
 
 
+class Impatient(DcmAutopilot):
+    """Counts the GPS as lost after half a second."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        params = params_of(aircraft)
+        hasty = replace(params, failsafe=replace(params.failsafe, gps_lost_s=0.5))
+        super().__init__(hasty, heading_reference, aircraft)
+
+
 class CruisesOn(DcmAutopilot):
     """Flies at cruise speed whatever wind is against it."""
 
@@ -124,3 +133,12 @@ class NeverTrims(DcmAutopilot):
         params = params_of(aircraft)
         untrimmed = replace(params, stabilise=replace(params.stabilise, integral_limit=0.0))
         super().__init__(untrimmed, heading_reference, aircraft)
+
+
+class BelievesEveryFix(DcmAutopilot):
+    """Compares no fix with those before."""
+
+    def update(self, estimate, m, setpoint) -> ActuatorCommand:
+        """As the sound one, which starts the comparison with this fix."""
+        self._memory["s"]["watched"] = self._memory["s"]["gps_lost"] = 0
+        return super().update(estimate, m, setpoint)

@@ -5,9 +5,12 @@ import pytest
 
 from estimator.interface import MEASURED_DTYPE, AttitudeEstimate, Measurements
 from estimator.premerlani import Premerlani
+from scenarios.harness.commands import export_text
 from scenarios.harness.flight import fly_scenario
+from scenarios.harness.logs import ours
 from scenarios.harness.registry import find
 from scenarios.harness.verdict import judge
+from sim import recording
 
 LOSSY = {"faults": "imu:dropped=0.05@-10"}
 UNEVEN = {"rates.imu_hz": 400, "board.dt_jitter": 0.2, **LOSSY}
@@ -77,3 +80,21 @@ def test_estimate_and_command_stay_while_no_sample_comes():
     assert t_s[258] == t_s[248]
     assert flight.log.measured["dt_s"][259] == pytest.approx(0.22, abs=1e-9)
     assert np.all(flight.log.flown["health"][400:] == 1)
+
+
+def test_recording_with_lost_samples_replays_without_them(tmp_path):
+    """Rows of lost samples are left out, of the reference too; an estimator that is given them refuses them."""
+    changes = {"duration_s": 20.0, "board.dt_jitter": 0.2, "faults": "imu:dropped=0.2@-1"}
+    flight = fly_scenario(find("turns_180"), changes, seed=0)
+    path = recording.save(flight, tmp_path)
+    log, all_rows = ours.read(path), flight.log.measured
+    came = np.diff(all_rows["t_s"], prepend=-1.0) > 0.0
+    assert 0.1 < np.mean(~came) < 0.3
+    assert log.rows.tobytes() == all_rows[came].tobytes()
+    assert log.reference is not None
+    np.testing.assert_array_equal(log.reference.R_eb, flight.log.truth["R_eb"][came])
+    found = Premerlani().replay(all_rows)
+    np.testing.assert_array_equal(found["R_eb"][came], Premerlani().replay(log.rows)["R_eb"])
+    assert np.all(found["health"][~came] == 2)
+    text = export_text.columns(flight)
+    assert all(len(column.values) == came.sum() for column in text)

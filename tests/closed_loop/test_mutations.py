@@ -22,6 +22,7 @@ WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
 NO_YAW = {"estimator_params.w_y": 0}
 UNAWARE = {"withheld": "gps_latency_s"}
+NOT_TOLD_THE_ELEVATION = {"withheld": "elevation_m"}
 UNTURNED = {"turn_table": False}
 TOLD_THE_LATENCY = {"estimator_params.gps_latency_s": 12.0}
 BROKEN_AUTOPILOTS = Path(__file__).with_name("broken_autopilots.py")
@@ -30,6 +31,7 @@ NEVER_MISSES_THE_GPS = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverMissesTheGps"}
 CLIMBS_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:ClimbsOn"}
 FLIES_THROUGH_THE_FENCE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FliesThroughTheFence"}
 LOOKS_TOO_LATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:LooksAtTheFenceTooLate"}
+BELIEVES_EVERY_FIX = {"autopilot": f"{BROKEN_AUTOPILOTS}:BelievesEveryFix"}
 CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
@@ -108,6 +110,8 @@ MUTATIONS = (
         "heading error of the nose, to be large",
     ),
     Mutation("launch_no_gps", "premerlani", CLIMBS_ON, "greatest height"),
+    Mutation("loiter_gps_stuck", "gyro_only", {}, "survived"),
+    Mutation("loiter_gps_stuck", "premerlani", BELIEVES_EVERY_FIX, "circled"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("motor_dead", "premerlani", IGNORES_THE_ELEVATOR, "angle of attack"),
@@ -136,6 +140,7 @@ MUTATIONS = (
     Mutation("turns_180_bank_45", "premerlani", NO_YAW, "heading below 10 deg after roll-out"),
     Mutation("turns_180_bank_60", "premerlani", TRUSTS_FORCE, "inclination error RMS while banked"),
     Mutation("turns_180_bank_60", "premerlani", {"manoeuvre.bank_deg": 45.0}, "banked by 54 deg or more"),
+    Mutation("turns_180_high", "premerlani", NOT_TOLD_THE_ELEVATION, "inclination error RMS while banked"),
     Mutation("vertical", "premerlani", NO_YAW, "heading error RMS afterwards"),
     Mutation("vertical", "premerlani", TRUSTS_FORCE, "inclination error RMS while going up and over"),
     Mutation("vertical", "premerlani", RUDDER_STUCK, "swung round to the left"),

@@ -274,3 +274,23 @@ def test_property_that_is_withheld_is_assumed_and_says_so():
     assert given(config, "premerlani").known["gps_latency_s"] == (0.3, "withheld", "")
     assert aboard(override(config, {"withheld": ""}))["gps_latency_s"].value == 12.0
     assert aboard(override(config, {"gps_latency_s": 1}))["gps_latency_s"].source == "set"
+
+
+@pytest.mark.parametrize(
+    ("changes", "physics_hz"),
+    [
+        ({}, 200), ({"rates.imu_hz": 400}, 400), ({"rates.imu_hz": 200}, 200),
+        ({"rates.imu_hz": 200, "rates.physics_hz": 1000}, 1000), ({"rates.physics_hz": 400}, 400),
+    ],
+)  # fmt: skip
+def test_physics_runs_at_200_hz_or_as_fast_as_the_inertial_sensors(changes, physics_hz):
+    """Unless it is set; a resolved configuration holds the number, and resolves to itself."""
+    config = resolve(override(CROSS, changes))
+    assert config.rates.physics_hz == physics_hz
+    assert config.rates.build().steps_per_tick == physics_hz // config.rates.imu_hz
+    assert resolve(config) == config
+
+
+def test_inertial_rate_that_does_not_divide_a_given_physics_rate_is_refused():
+    with pytest.raises(ValueError, match="inertial rate 400 Hz does not divide the physics rate of 1000 Hz"):
+        override(CROSS, {"rates.imu_hz": 400, "rates.physics_hz": 1000})

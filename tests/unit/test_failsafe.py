@@ -34,16 +34,18 @@ class Aboard:
         self.row["dt_s"], self.row["force_b_m_s2"] = DT_S, (0.0, 0.0, -9.8)
         self.ticks, self.height_m, self.latency_s, self.numbers, self.ground_m_s = 0, 60.0, 0.3, True, 12.0
         self.dt_s = DT_S
+        self.north_m = 200.0  # of the last fix, moved by the velocity that it reports
 
     def fly(self, setpoint, seconds, *, gps=True, estimate=None):
         """Commands of so many seconds; a fix every 0.2 s where there is a GPS."""
         commands = []
         for _ in range(round(seconds / self.dt_s)):
+            self.north_m += self.dt_s * self.ground_m_s
             self.row["t_s"], self.row["dt_s"] = self.ticks * self.dt_s, self.dt_s
             self.row["gps_new"] = gps and self.ticks % round(0.2 / self.dt_s) == 0
             if self.row["gps_new"][0]:
                 self.row["gps_valid"], self.row["gps_t_s"] = 1, self.row["t_s"] - self.latency_s
-                self.row["gps_p_e_m"] = (200.0, 0.0, -self.height_m) if self.numbers else math.nan
+                self.row["gps_p_e_m"] = (self.north_m, 0.0, -self.height_m) if self.numbers else math.nan
                 self.row["gps_v_e_m_s"] = (self.ground_m_s, 0.0, 0.0)
             self.row["force_b_m_s2"] += 1e-9 * (-1) ** self.ticks  # frozen is what never changes
             measured = Measurements(self.row.copy(), 0)

@@ -32,7 +32,8 @@ class Column(NamedTuple):
 
 def columns(flight: Flight) -> list[Column]:
     """The columns of `flight`; those of an instrument without samples are left out."""
-    rows, known = flight.log.measured, ours.known_of(flight)
+    came, known = ours.arrived(flight.log.measured), ours.known_of(flight)
+    rows = flight.log.measured[came]
     found = [Column("time_s", "time s", rows["t_s"]), Column("interval_s", "interval s", rows["dt_s"])]
     found += _vector("gyro_{}_rad_s", "gyro.{} rad/s", rows["gyro_b_rad_s"], "xyz")
     found += _vector("force_{}_m_s2", "force.{} m/s^2", rows["force_b_m_s2"], "xyz")
@@ -51,7 +52,7 @@ def columns(flight: Flight) -> list[Column]:
         ):
             if np.isfinite(rows[column][new]).any():
                 found.append(Column(name, meaning, _where(new, rows[column])))
-    R_eb = flight.log.truth["R_eb"]
+    R_eb = flight.log.truth["R_eb"][came]
     found += [Column(f"r{i}{j}", f"r{i}{j}", R_eb[:, i, j]) for i in range(3) for j in range(3)]
     return found
 

@@ -30,9 +30,10 @@ def read(path: Path) -> RecordedLog:
         raise LogError(str(error)) from error
     if not len(flight.log):
         raise LogError(f"{path}: a flight without a tick")
-    rows = _measured_of(flight)
+    rows, came = _measured_of(flight), arrived(flight.log.measured)
+    rows = rows[came]
     ledger = Ledger()
-    reference = Reference(_true(flight.log.truth["R_eb"], ledger), "truth", "the true attitude")
+    reference = Reference(_true(flight.log.truth["R_eb"][came], ledger), "truth", "the true attitude")
     name = path.name if path.is_dir() else path.parent.name
     known = known_of(flight) if "known" in flight.manifest else _measured(rows)  # replay uses what was known in flight
     known |= calibration_of(flight)
@@ -40,6 +41,11 @@ def read(path: Path) -> RecordedLog:
         rows, name or path.name, properties.sensors(rows), reference, (), place_of(flight), known, ledger,
         on_ground=on_ground_of(flight),
     )  # fmt: skip
+
+
+def arrived(rows: NDArray[Any]) -> NDArray[np.bool_]:
+    """Rows whose inertial sample arrived: a lost one repeats the time stamp of the one before."""
+    return np.concatenate([[True], np.diff(rows["t_s"]) > 0.0]) if len(rows) else np.zeros(0, np.bool_)
 
 
 def _measured_of(flight: Flight) -> NDArray[Any]:
