@@ -50,14 +50,16 @@ def standby(seconds, bank_rad, *, climb_rad=0.0, params=None, accelerometer=True
     wrong = (attitude * Rotation.from_euler("x", tilt_deg, degrees=True)).as_matrix()
     down, filtered, setpoint = attitude.as_matrix()[:, 2], v[0], Setpoint(Mode.STABILISE)
     force = force + np.random.default_rng(1).normal(0.0, 0.1, force.shape) if accelerometer else np.nan * force
-    errors_deg = []
+    errors_deg, place = [], np.zeros(3)
     for k in range(len(t_s)):
         row["t_s"], row["dt_s"] = t_s[k], DT_S
         row["gyro_b_rad_s"], row["force_b_m_s2"] = rate[k] + OFFSET_RAD_S, force[k]
         filtered = filtered + DT_S / 1.0 * (v[k] - filtered)  # the receiver's own filter
+        place = place + DT_S * filtered
         row["gps_new"] = gps and k % 10 == 0
         if row["gps_new"][0]:
-            row["gps_valid"], row["gps_t_s"], row["gps_v_e_m_s"] = 1, t_s[k], filtered
+            row["gps_valid"], row["gps_t_s"], row["gps_v_e_m_s"] = 1, t_s[k], filtered + 0.01 * (-1) ** (k // 10)
+            row["gps_p_e_m"] = place
         estimate = AttitudeEstimate(wrong[k]) if t_s[k] < 1.0 else SICK
         autopilot.update(estimate, Measurements(row.copy(), 0), setpoint)
         cosine = autopilot._memory["s"]["R_kept_eb"][0, 2] @ down[k]
