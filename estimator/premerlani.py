@@ -44,6 +44,8 @@ wind.
 *Wind* (off by default; the paper: "somehow compute the wind vector").  Learnt in turns, `estimator.blocks.wind`.  The
 reference of Eqn 22 is then the direction of ground velocity less wind, and the heading converges to the nose.
 
+*In the hand* (`estimator.blocks.held`).  Before it is first moved, a faster loop learns the offset.
+
 *Saturation* (the paper: "error will be introduced into the roll-pitch orientation").  A clipped axis is replaced by the
 value that the estimate expects, so that only the other axes correct.  The full scale comes from the data sheet.
 
@@ -68,6 +70,7 @@ from estimator.blocks.gps_lag import (
     start_history,
     turn_frame,
 )
+from estimator.blocks.held import FASTER_I_1_S2, FASTER_P_1_S, HELD, watch_held
 from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.pi import correct, corrected_rate, learn_offset, weigh
 from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, fix_came, health_of, refuse, screen, watch_limit
@@ -107,7 +110,7 @@ _STATE = (
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
 )
-STATE_DTYPE = state_dtype(PremerlaniParams, *WIND_FILTER, *LAG, *_STATE)
+STATE_DTYPE = state_dtype(PremerlaniParams, *WIND_FILTER, *LAG, *HELD, *_STATE)
 
 
 @inlined
@@ -245,7 +248,9 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
     good = screen(row, s)
     if good:
         corrected_rate(row, s, good)
-        if s.learning:  # of the previous sample: the processor need not wait for it, and it changes slowly
+        if s.held:
+            learn_offset(s.roll_pitch_b, FASTER_P_1_S, FASTER_I_1_S2, s.offset_limit_rad_s, s.dt_s, s.omega_i_b)
+        elif s.learning:  # of the previous sample: the processor need not wait for it, and it changes slowly
             learn_offset(s.total_b, s.k_p, s.k_i, s.offset_limit_rad_s, s.dt_s, s.omega_i_b)
         watch_limit(s.omega_i_b, s.offset_limit_rad_s, s)
         if not integrate(s.R_eb, s.omega_total_b, s.dt_s):  # Eqns 17-21
@@ -261,6 +266,9 @@ def step(rows, k, state):  # type: ignore[no-untyped-def]
         weigh(s.w_rp, s.roll_pitch_b, w_y, s.yaw_b, s.total_b)
         correct(s.total_b, s.k_p, s.omega_p_b)
         w = s.omega_b_rad_s
+        watch_held(row.force_b_m_s2, w, s)
+        if s.held:
+            correct(s.roll_pitch_b, FASTER_P_1_S, s.omega_p_b)
         s.learning = w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < s.integrate_below_rad_s * s.integrate_below_rad_s
     return health_of(s, s.locked, s.fix_age_s <= FIX_LIFE_S)
 

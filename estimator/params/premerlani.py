@@ -53,6 +53,8 @@ class PremerlaniParams(Params):
         on: better tilt in wind without an airspeed sensor; off: ground speed is used
     learn_wind : switch  learn the wind in turns, for Eqns 22 and 25; needs `rotate_history`
         on: the heading converges to the nose; off: to the course
+    learn_held_s : s  for how long the offset is learnt quickly, before the model is first moved by a throw or a course
+        higher: a long wait in the hand is used; lower: less harm if it flies without any GPS (0: off)
     min_speed_m_s : m/s  slowest speed at which a course is used
         higher: yaw stays uncorrected for longer at low speed; lower: the noisy course of a slow aeroplane is used
     elevation_m : m  elevation of the launch place above the sea, for the density of the air
@@ -80,6 +82,7 @@ class PremerlaniParams(Params):
     use_airspeed: bool = True
     turn_speed: bool = False
     learn_wind: bool = False
+    learn_held_s: float = 20.0
     min_speed_m_s: float = 3.0
     elevation_m: float = 0.0
 
