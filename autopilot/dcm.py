@@ -89,9 +89,14 @@ _STATE = np.dtype(
         ("airspeed_known", "i8"),  # measured, or from GPS and wind
         ("lift_m_s", "f8"),  # airspeed from the elevator, 0 if unknown
         ("elevator", "f8"),  # last command
+        ("refused", "i8"),  # contradicted by throttle and elevator
+        ("doubt_s", "f8"),  # how long it has been contradicted, decreasing while it is not
+        ("by_throttle_m_s", "f8"),  # airspeed that goes with throttle and climb, 0 before the first
+        ("throttle", "f8"),  # last command
         ("air_left_s", "f8"),  # remaining time for which the last measured airspeed is used
         ("airspeed_wanted_m_s", "f8"),
         ("ground_m_s", "f8"),  # speed over the ground, NaN if unknown
+        ("wind_seen_e_m_s", "f8", (2,)),  # largest tailwind, north and east
         ("headwind_m_s", "f8"),  # along the desired track
         ("unseen_turn_rad", "f8"),  # turn not yet visible in the GPS course
         ("outbound", "i8"),  # flying away from the launch point after passing it
@@ -175,7 +180,7 @@ def reckon_speed(wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
     travels = s.led_by in (COURSE, RETURN, LOITER, WAYPOINTS)
     if travels:
         towards_north, towards_east = way_wanted(me.setpoint, row, s, me.p.guidance)
-        believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, me.p, dt_s)
+        believe_headwind(towards_north, towards_east, s.led_by in (LOITER, WAYPOINTS), wind_e_m_s, row, s, me.p, dt_s)
     want_airspeed(me.setpoint, travels, s, e)
     believe_airspeed(wind_e_m_s, row, s, me.p, dt_s)
 
@@ -184,7 +189,8 @@ def reckon_speed(wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
 def lead(R_eb, wind_e_m_s, row, height_m, me, dt_s):  # type: ignore[no-untyped-def]
     """Bank and pitch demand, rad, and throttle of the navigation modes, which all hold a height."""
     setpoint, s, p, failsafe = me.setpoint, me.s, me.p.guidance, me.p.failsafe
-    north, east = direction_of_travel(R_eb, wind_e_m_s, row, s, me.on_nose, p)
+    blown = s.led_by in (LOITER, WAYPOINTS) and s.headwind_m_s > p.blown * me.p.energy.airspeed_m_s
+    north, east = direction_of_travel(R_eb, wind_e_m_s, row, s, me.on_nose, blown, p)
     limit_rad, wanted_m = min(setpoint.bank_limit_rad, p.bank_limit_rad), setpoint.height_m
     if s.led_by != setpoint.mode or not setpoint.radio:  # return even if the last bank limit was tiny
         limit_rad = max(limit_rad, failsafe.bank_rad)
@@ -282,10 +288,11 @@ def steer_on(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s):  # type:
     reckon_speed(wind_e_m_s, row, me, dt_s)
     feel_lift(row, s, p, dt_s)
     if s.mode == MANUAL:
+        s.doubt_s = s.refused = 0  # its throttle is not remembered
         return by_hand(me.setpoint)
     moved = control(R_eb, omega_b_rad_s, wind_e_m_s, row, height_m, me, dt_s)
     aileron, elevator, rudder, throttle, bank, pitch = moved
-    s.elevator = elevator
+    s.elevator, s.throttle = elevator, throttle
     return aileron, elevator, rudder, throttle, s.mode, bank, pitch
 
 

@@ -24,7 +24,9 @@ AIAA 83-2239.
 import math
 from dataclasses import dataclass
 
+from autopilot.doubt import doubt_airspeed
 from autopilot.guidance import gps_age, height, is_wind, unit
+from autopilot.interface import LOW
 from autopilot.stabilise import far_off
 from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.kernels import clip
@@ -53,7 +55,9 @@ class EnergyParams:
     gain_per_speed_1_s, gain_limit_m_s2 : acceleration demand per speed error (1/s), and its limit (m/s2) (default 0.3
         and 1.5).  Higher: holds speed more tightly, height less
     height_weight : 1 - w, share of the pitch that holds height (default 0.5).  Higher: height first; 0: speed only
-    climb_per_margin_1_s : climb allowed per speed above `least_airspeed` (1/s, default 3).  Lower: more protection
+    climb_per_margin_1_s, climb_per_rough_margin_1_s : climb allowed per speed above `least_airspeed`, measured, and
+        from the elevator (1/s, default 3 and 2).  Lower: more protection, and climbs less steeply when slow; higher:
+        surges
     recovery_sink_m_s : sink demand at `least_airspeed` (m/s, default 1).  Higher: faster recovery, more height lost
     pitch_trim_rad : pitch in level flight at cruise (rad, default 1 deg).  Higher: climbs until learnt
     pitch_limit_rad : largest pitch demand (rad, default 15 deg).  Higher: steeper, nearer the stall
@@ -68,6 +72,10 @@ class EnergyParams:
     throttle_per_height_1_m : integral gain of the energy error (1/m, default 0.01).  Higher: learns trim faster
     throttle_integral_limit : limit of that integral (default 0.2).  Lower: large trim errors remain
     throttle_least : minimum throttle (default 0.1), for airflow over the tail.  Higher: descends more slowly
+    doubt_m_s : difference of an airspeed from those that throttle and elevator tell, beyond which it is refused (m/s,
+        default 2.5).  Higher: larger errors are believed; lower: refused in gusts
+    doubt_s : time for which it has to differ, and to agree again (s, default 4).  Higher: refused later
+    doubt_filter_s : time constant of the airspeed from the throttle (s, default 2).  Higher: smoother but later
     elevation_m : elevation of the launch place above the sea (m, default 0).  Higher: expects faster motion at the same
         airspeed, and more throttle
     """
@@ -89,6 +97,7 @@ class EnergyParams:
     gain_limit_m_s2: float = 1.5
     height_weight: float = 0.5
     climb_per_margin_1_s: float = 3.0
+    climb_per_rough_margin_1_s: float = 2.0
     recovery_sink_m_s: float = 1.0
     pitch_trim_rad: float = math.radians(1.0)
     pitch_limit_rad: float = math.radians(15.0)
@@ -102,12 +111,16 @@ class EnergyParams:
     throttle_per_height_1_m: float = 0.01
     throttle_integral_limit: float = 0.2
     throttle_least: float = 0.1
+    doubt_m_s: float = 2.5
+    doubt_s: float = 4.0
+    doubt_filter_s: float = 2.0
     elevation_m: float = 0.0
 
 
 SLOWEST, FASTEST = 0.6, 1.6  # range of a plausible airspeed over cruise
 STALL_MARGIN = 1.2
-TURN_MARGIN = 1.1
+SEEN_S = 300.0  # time constant with which the largest tailwind is forgotten
+TURN_MARGIN = 1.15
 
 
 @kernel
@@ -116,7 +129,8 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
 
     Measured, if a pitot tube is fitted; else from GPS velocity minus estimated wind, corrected for the receiver's
     filter (time constant T), which shortens a vector turning at w by sqrt(1 + (w T)^2); else the trim speed.  Ground
-    speed alone is no measure of airspeed: it is wrong by the wind, and changes by twice that between opposite legs.
+    speed alone is no measure of airspeed: it is wrong by the wind, and changes by twice that between opposite legs.  An
+    airspeed that throttle and elevator contradict counts as unknown (`autopilot.doubt`).
 
     wind_e_m_s : shape (3,) or NaN   row : measured   p : record of AutopilotParams
     s : record with `airspeed_m_s`, `true_factor`, `airspeed_known`, `air_left_s`, updated
@@ -135,6 +149,10 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
             filtered_m_s = math.sqrt((v[0] - w[0]) ** 2 + (v[1] - w[1]) ** 2 + (v[2] - w[2]) ** 2)
             turned = s.unseen_turn_rad * p.guidance.gps_filter_s / max(lag_s, 1e-3)
             now_m_s, s.airspeed_known = filtered_m_s * math.hypot(1.0, turned) / s.true_factor, 1
+    if s.airspeed_known:
+        doubt_airspeed(now_m_s, -row.gps_v_e_m_s[2] if math.isfinite(gps_age(row, p.guidance)) else 0.0, s, e, dt_s)
+    if s.refused:
+        s.airspeed_known = 0
     if not s.airspeed_known:
         now_m_s = s.airspeed_wanted_m_s
     now_m_s = clip(now_m_s, SLOWEST * e.airspeed_m_s, FASTEST * e.airspeed_m_s)
@@ -143,14 +161,30 @@ def believe_airspeed(wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-de
 
 
 @kernel
-def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
+def see_wind(north, east, s, dt_s):  # type: ignore[no-untyped-def]
+    """Update the wind that the ground speed alone shows: the largest tailwind of the last minutes, along its course.
+
+    north, east : direction of the course   s : record with `ground_m_s`, `airspeed_m_s`, `true_factor`; updates
+    `wind_seen_e_m_s`
+    """
+    tailwind_m_s, w = s.ground_m_s - s.true_factor * s.airspeed_m_s, s.wind_seen_e_m_s
+    w[0] -= dt_s / SEEN_S * w[0]
+    w[1] -= dt_s / SEEN_S * w[1]
+    if tailwind_m_s > math.hypot(w[0], w[1]):
+        w[0], w[1] = tailwind_m_s * north, tailwind_m_s * east
+
+
+@kernel
+def believe_headwind(towards_north, towards_east, circles, wind_e_m_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Update ground speed and headwind along the desired direction, at least 0, m/s, in `s`.
 
     The headwind comes from the estimated wind; if unknown, from the difference of airspeed and ground speed along the
     track, which shows it even before a turn into the wind.  It rises quickly and falls slowly, because it is not
-    visible across the wind.
+    visible across the wind.  On a circle or a route the whole wind counts, whatever the present track: who flies
+    slowly with it is carried away before he has turned.
 
-    towards_north, towards_east : unit vector, or (0, 0) for the present track   wind_e_m_s : shape (3,) or NaN
+    towards_north, towards_east : unit vector, or (0, 0) for the present track   circles : on a circle or a route
+    wind_e_m_s : shape (3,) or NaN
     row : measured   p : record of AutopilotParams   s : record with `ground_m_s` (NaN: unknown) and `headwind_m_s`
     """
     now_m_s, lag_s = 0.0, gps_age(row, p.guidance)
@@ -162,7 +196,12 @@ def believe_headwind(towards_north, towards_east, wind_e_m_s, row, s, p, dt_s): 
         if towards_north == 0.0 and towards_east == 0.0:
             towards_north, towards_east = north, east
         now_m_s = (s.true_factor * s.airspeed_m_s - s.ground_m_s) * (towards_north * north + towards_east * east)
-        if is_wind(wind_e_m_s, 2):
+        see_wind(north, east, s, dt_s)
+        if is_wind(wind_e_m_s, 2) and circles:
+            now_m_s = math.hypot(wind_e_m_s[0], wind_e_m_s[1])
+        elif circles:
+            now_m_s = max(abs(now_m_s), math.hypot(s.wind_seen_e_m_s[0], s.wind_seen_e_m_s[1]))
+        elif is_wind(wind_e_m_s, 2):
             now_m_s = -(towards_north * wind_e_m_s[0] + towards_east * wind_e_m_s[1])
     now_m_s = max(now_m_s, 0.0)
     filter_s = p.energy.headwind_found_s if now_m_s > s.headwind_m_s else p.energy.headwind_lost_s
@@ -218,12 +257,18 @@ def least_airspeed(s, e):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def by_elevator(s):  # type: ignore[no-untyped-def]
+    """Whether the guards against a stall use the airspeed from the elevator."""
+    return s.lift_m_s > 0.0 and not (s.airspeed_known and s.air_left_s > 0.0)
+
+
+@kernel
 def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
     """The airspeed of the guards against a stall, m/s; infinite if unknown.
 
     Measured, or from the elevator (`autopilot.lift`), or from the estimated wind, which is late and may be wrong.
     """
-    if s.lift_m_s > 0.0 and not (s.airspeed_known and s.air_left_s > 0.0):
+    if by_elevator(s):
         return s.lift_m_s
     return s.airspeed_m_s if s.airspeed_known else math.inf
 
@@ -232,14 +277,20 @@ def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
 def most_climb(s, e):  # type: ignore[no-untyped-def]
     """Largest climb demand, m/s, that leaves the speed above the stall; infinite if the airspeed is unknown.
 
-    s : record with `airspeed_m_s`, `airspeed_known`, `lift_m_s`   e : record of EnergyParams
+    Close to the ground, in LOW, an aeroplane with a motor does not dive for speed: it sinks at `recovery_sink_m_s`.
+
+    s : record with `airspeed_m_s`, `airspeed_known`, `lift_m_s`, `mode`   e : record of EnergyParams
     """
-    return e.climb_per_margin_1_s * (airspeed_to_protect(s) - least_airspeed(s, e)) - e.recovery_sink_m_s
+    gain_1_s = e.climb_per_rough_margin_1_s if by_elevator(s) else e.climb_per_margin_1_s
+    most_m_s = gain_1_s * (airspeed_to_protect(s) - least_airspeed(s, e)) - e.recovery_sink_m_s
+    if s.mode == LOW and e.throttle_per_climb_s_m > 0.0:
+        return max(most_m_s, -e.recovery_sink_m_s)
+    return most_m_s
 
 
 @kernel
 def steepest_bank(s, e):  # type: ignore[no-untyped-def]
-    """Largest bank, rad, of a level turn 10 % above its stalling speed, which grows with 1 / sqrt(cos bank)."""
+    """Largest bank, rad, of a level turn 15 % above its stalling speed, which grows with 1 / sqrt(cos bank)."""
     slowest_m_s = TURN_MARGIN * (e.inverted_stall_m_s if s.inverted else e.stall_m_s)
     return math.acos(min((slowest_m_s / airspeed_to_protect(s)) ** 2, 1.0))
 

@@ -28,6 +28,8 @@ class GuidanceParams:
     slow_ground : ground speed over cruise speed below which turns are gentler, see `agility` (default 0.9).  Higher:
         gentle turns also in light headwind; lower: the heading may be lost when drifting backwards
     least_agility : fraction of the bank kept at the lowest ground speed (default 0.3).  Higher: faster turns
+    blown : wind over cruise speed beyond which circles and routes take the direction from GPS velocity and wind instead
+        of an estimator's course (default 0.5).  Higher: the course is lost in strong wind; lower: noisier turns
     wind_share : largest wind used for navigation, over the airspeed (default 0.8).  Higher: more crab in strong wind
     gps_filter_s : age of a fix beyond its time stamp, due to the receiver's filter (s, default 1).  Wrong: the track is
         offset in turns
@@ -41,6 +43,7 @@ class GuidanceParams:
     bank_limit_rad: float = math.radians(85.0)
     slow_ground: float = 0.9
     least_agility: float = 0.3
+    blown: float = 0.5
     wind_share: float = 0.8
     gps_filter_s: float = 1.0
     gps_patience_s: float = 5.0
@@ -97,7 +100,22 @@ def unseen_turn(unseen_rad, R_eb, omega_b_rad_s, lag_s, dt_s):  # type: ignore[n
 
 
 @kernel
-def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, p):  # type: ignore[no-untyped-def]
+def turned_now(north, east, s):  # type: ignore[no-untyped-def]
+    """A direction of the last fix, rotated by the unseen turn; s : record with `unseen_turn_rad`."""
+    cosine, sine = math.cos(s.unseen_turn_rad), math.sin(s.unseen_turn_rad)
+    return north * cosine - east * sine, north * sine + east * cosine
+
+
+@kernel
+def over_ground(north, east, wind_north_m_s, wind_east_m_s, airspeed_m_s, p):  # type: ignore[no-untyped-def]
+    """Direction over the ground with the nose (north, east); a wind near or above the airspeed is limited."""
+    wind_m_s, most_m_s = math.hypot(wind_north_m_s, wind_east_m_s), p.wind_share * airspeed_m_s
+    part = most_m_s / wind_m_s if wind_m_s > most_m_s else 1.0
+    return unit(airspeed_m_s * north + part * wind_north_m_s, airspeed_m_s * east + part * wind_east_m_s)
+
+
+@kernel
+def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, blown, p):  # type: ignore[no-untyped-def]
     """Horizontal direction (north, east) in which the aeroplane moves over the ground.
 
     With a heading locked to the course it is the first column of the matrix.  With a nose heading it is nose x
@@ -105,21 +123,26 @@ def direction_of_travel(R_eb, wind_e_m_s, row, s, on_nose, p):  # type: ignore[n
     airspeed is limited so that the direction stays ahead of the nose: even when blown backwards, the aeroplane keeps
     pointing home instead of turning to where it drifts.
 
-    R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured
-    s : record with `airspeed_m_s`, `true_factor`, `unseen_turn_rad`
+    In a turn in strong wind a course swings faster than an estimator follows, and in either sense.  There the nose is
+    the GPS velocity less the wind, rotated by the unseen turn: the nose turns as the gyros say.
+
+    R_eb : shape (3, 3)   wind_e_m_s : shape (3,) or NaN   row : measured   blown : in strong wind
+    s : record with `airspeed_m_s`, `true_factor`, `unseen_turn_rad`, `wind_seen_e_m_s`
     """
     north, east = unit(R_eb[0, 0], R_eb[1, 0])
+    known, v = is_wind(wind_e_m_s, 2), row.gps_v_e_m_s
+    if blown and not (on_nose and known) and math.isfinite(gps_age(row, p)):
+        w0, w1 = (wind_e_m_s[0], wind_e_m_s[1]) if known else (s.wind_seen_e_m_s[0], s.wind_seen_e_m_s[1])
+        x, y = turned_now(v[0] - w0, v[1] - w1, s)
+        north, east = unit(x, y)
+        return over_ground(north, east, w0, w1, s.true_factor * s.airspeed_m_s, p)
     if not on_nose:
         return north, east
-    if is_wind(wind_e_m_s, 2):
-        true_m_s = s.true_factor * s.airspeed_m_s
-        wind_m_s, most_m_s = math.hypot(wind_e_m_s[0], wind_e_m_s[1]), p.wind_share * true_m_s
-        part = most_m_s / wind_m_s if wind_m_s > most_m_s else 1.0
-        return unit(true_m_s * north + part * wind_e_m_s[0], true_m_s * east + part * wind_e_m_s[1])
-    v = row.gps_v_e_m_s
+    if known:
+        return over_ground(north, east, wind_e_m_s[0], wind_e_m_s[1], s.true_factor * s.airspeed_m_s, p)
     if math.isfinite(gps_age(row, p)) and math.hypot(v[0], v[1]) > 3.0:
-        cosine, sine = math.cos(s.unseen_turn_rad), math.sin(s.unseen_turn_rad)
-        return unit(v[0] * cosine - v[1] * sine, v[0] * sine + v[1] * cosine)
+        x, y = turned_now(v[0], v[1], s)
+        return unit(x, y)
     return north, east
 
 

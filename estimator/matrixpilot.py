@@ -22,7 +22,8 @@ which turns an aeroplane at rest; here it is zero.)
 
 *Wind* from pairs of reports between which the nose turned: the change of ground velocity equals that of the velocity
 through the air, whose direction is the nose's.  Yaw that is found late is a turn without a change of velocity: it
-leaves a false wind of some metres per second that takes several turns to fade.
+leaves a false wind of some metres per second that takes several turns to fade.  It is reported once the airspeeds in
+different directions confirm it (`estimator.blocks.wind`); the estimator itself uses it as the firmware does.
 
 *Renormalisation* (2017) keeps the direction of the Z row: E = D x N, then N = E x D, and Eqn 21.  The error of Eqn 17
 then tilts the matrix as much as with Eqns 18-20 (`estimator.rotation.renormalise`), in the other direction.
@@ -55,6 +56,7 @@ import numpy as np
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip, cross, put, wrap
 from estimator.blocks.screening import FORCE_GOOD, GPS, fix_came, health_of, refuse, screen, take_rate, watch_limit
+from estimator.blocks.wind import WIND_CHECK, check_wind
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, Column, ImuSample
 from estimator.params.matrixpilot import CLASSIC as CLASSIC
@@ -103,7 +105,7 @@ _STATE = (
     Column("near_s", (), "how long the yaw error has been small"),
     Column("locked", (), "1 once yaw was found", integer=True),
 )
-STATE_DTYPE = state_dtype(MatrixPilotParams, *_STATE)
+STATE_DTYPE = state_dtype(MatrixPilotParams, *WIND_CHECK, *_STATE)
 
 
 @kernel
@@ -243,6 +245,8 @@ def take_report(row, s):  # type: ignore[no-untyped-def]
     carry_on(course, speed, sink, s)
     if s.estimate_wind:
         learn_wind(s)
+        if speed > s.min_speed_m_s:
+            check_wind(s, speed * np.cos(course), speed * np.sin(course), s.fix_age_s)
     before = s.airspeed_m_s
     x, y, z = (s.v_e_m_s[0] - s.wind_e_m_s[0], s.v_e_m_s[1] - s.wind_e_m_s[1], s.v_e_m_s[2] - s.wind_e_m_s[2])
     s.airspeed_m_s = np.sqrt(x * x + y * y + z * z)
@@ -285,7 +289,6 @@ def learn_wind(s):  # type: ignore[no-untyped-def]
         wind[0] += WIND_PART * (0.5 * (v[0] + v0[0] - c * sx + n * sy) - wind[0])
         wind[1] += WIND_PART * (0.5 * (v[1] + v0[1] - n * sx - c * sy) - wind[1])
         wind[2] += WIND_PART * (0.5 * (v[2] + v0[2] - airspeed * sz) - wind[2])
-        s.wind_known = 1
     elif s.pair_begun:
         return
     for i in range(3):

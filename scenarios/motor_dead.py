@@ -58,7 +58,7 @@ SCENARIO = Scenario(
         Check("time to the ground", "s", ground_contact_s, EARLIEST_S, ">="),
         Check("angle of attack", "deg", over(angle_of_attack_deg, highest, at(DEAD_S), before_ground), 13.0),
         Check("sink at the ground", "m/s", at_ground(sink_m_s), 3.0),
-        Check("bank at the ground", "deg", at_ground(bank_size_deg), 20.0),
+        Check("bank at the ground", "deg", at_ground(bank_size_deg), 25.0),
         Check("distance from the launch point at the ground", "m", at_ground(launch_distance_m), 200.0),
         Check.rms(
             "inclination error RMS in the glide", "deg", inclination_error_deg, 5.0, at(DEAD_S), before_ground,

@@ -1,5 +1,6 @@
 """Events of a flight, read from its log afterwards: phases, modes, GPS, faults, the end."""
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
@@ -19,6 +20,9 @@ _PHASES = {
     Phase.FLYING: "released",
     Phase.RESTING: "at rest on the table",
 }
+_WIND_S = 20.0  # over which wind and airspeed are compared
+_WIND_BACK_M_S = 1.0  # airspeed above the wind from which it counts as held again
+_HOLDING = (Mode.RETURN, Mode.LOITER, Mode.WAYPOINTS)
 _FAILSAFES = {
     Mode.CIRCLE: "no GPS",
     Mode.GLIDE: "no GPS for a long time",
@@ -50,6 +54,7 @@ def events_of(
         _mode_event(Mode(mode[k]), Mode(mode[max(k - 1, 0)]), float(t_s[k]), script, release_s) for k in changes(mode)
     ]
     events += _radio_events(script, release_s, float(t_s[-1]))
+    events += _wind_events(log)
     events += [
         Event(float(t_s[k]), f"estimator {Health(log.flown['health'][k]).name.lower()}")
         for k in changes(log.flown["health"])
@@ -79,6 +84,27 @@ def _mode_event(mode: Mode, before: Mode, t_s: float, script: Script | None, rel
     elif setpoint is not None and mode == Mode.GLIDE and before not in (Mode.GLIDE, Mode.CIRCLE):
         reason = "the fence" if setpoint.radio else "no radio for a long time"
     return Event(t_s, f"{text}: {reason}", "warn") if reason else Event(t_s, text)
+
+
+def _wind_events(log: Log) -> list[Event]:
+    """When the wind became stronger than the airspeed, means of `_WIND_S`, where a place has to be held; and weaker."""
+    t_s, wind = log.truth["t_s"], np.hypot(*log.truth["wind_e_m_s"].T[:2])
+    ticks = int(np.searchsorted(t_s, t_s[0] + _WIND_S))
+    if ticks >= len(t_s):
+        return []
+    held = np.isin(log.flown["mode"], _HOLDING) & (log.truth["phase"] == Phase.FLYING)
+    sums, n_held = np.cumsum(np.where(held, wind - log.truth["airspeed_m_s"], 0.0)), np.cumsum(held)
+    excess_m_s = np.full(len(t_s), -math.inf)
+    whole = n_held[ticks:] - n_held[:-ticks] == ticks
+    excess_m_s[ticks:][whole] = (sums[ticks:] - sums[:-ticks])[whole] / ticks
+    clear = (excess_m_s > 0.0) | (excess_m_s < -_WIND_BACK_M_S)  # between the two it stays as it was
+    stronger = (excess_m_s > 0.0)[np.maximum.accumulate(np.where(clear, np.arange(len(t_s)), 0))]
+    return [
+        Event(float(t_s[k]), "wind stronger than can be held", "warn")
+        if stronger[k]
+        else Event(float(t_s[k]), "wind can be held again")
+        for k in (np.flatnonzero(np.diff(stronger)) + 1).tolist()
+    ]
 
 
 def _radio_events(script: Script | None, release_s: float, last_s: float) -> list[Event]:

@@ -33,13 +33,14 @@ import math
 
 import numpy as np
 
-from estimator.ap_dcm.wind import AIR_LIFE_S, learn_wind
+from estimator.ap_dcm.wind import AIR_LIFE_S, examine_wind, learn_wind
 from estimator.ap_dcm.yaw import FIX_LIFE_S, MIN_SPEED_M_S, SPIN_LIMIT_RAD_S, correct_yaw, spin_gain
 from estimator.blocks.air import true_airspeed_factor
 from estimator.blocks.compiled import Compiled, state_dtype, write_estimate
 from estimator.blocks.kernels import clip, cross, dot, put
 from estimator.blocks.magnetometer import FIELD, take_field
 from estimator.blocks.screening import FORCE_GOOD, GPS, airspeed_came, fix_came, health_of, refuse, screen, take_rate
+from estimator.blocks.wind import WIND_CHECK
 from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2, Column, HeadingReference, ImuSample
 from estimator.params.ap_dcm import AP_DCM_2013, MOST_FIXES, ApDcmParams, Quirk
@@ -92,9 +93,10 @@ _STATE = (
     Column("course_yaw_s", (), "when the course last corrected yaw"),
     Column("nose_last", (3,), "nose at the last wind estimate"),
     Column("v_wind_e_m_s", (3,), "velocity at the last wind estimate"),
+    Column("straight_share", (), "part of the wind taken from measured airspeed along a compass's nose"),
     Column("wind_s", (), "time of that; -inf before the first"),
 )
-STATE_DTYPE = state_dtype(ApDcmParams, *FIELD, *_STATE)
+STATE_DTYPE = state_dtype(ApDcmParams, *FIELD, *WIND_CHECK, *_STATE)
 
 
 @kernel
@@ -275,6 +277,8 @@ def correct_by_force(row, s, good):  # type: ignore[no-untyped-def]
         s.sum_s = 0.0
     if s.lock and s.fly_forward and s.estimate_wind:
         learn_wind(s)
+        if s.speed_m_s >= MIN_SPEED_M_S:
+            examine_wind(s)
     forget_interval(s)
     for i in range(3):
         s.v_last_e_m_s[i] = s.v_e_m_s[i]

@@ -7,10 +7,12 @@ ArduPilot, libraries/AP_AHRS/AP_AHRS_DCM, revision 279f6d00 of 10 July 2013.
 
 import numpy as np
 
+from estimator.blocks.wind import check_wind
 from estimator.compiler.jit import kernel
 
 AIR_LIFE_S = 1.0  # an older airspeed is not used
 WIND_RESTART_S, WIND_STRAIGHT_S = 10.0, 2.0
+STRAIGHT_SHARE, STRAIGHT_KNOWN = 0.08, 0.9  # of the wind taken from each airspeed; and after which it is reported
 WIND_TURN, WIND_JUMP_M_S = 0.2, 20.0  # smallest change of the nose, and largest accepted step
 
 
@@ -41,7 +43,21 @@ def learn_wind(s):  # type: ignore[no-untyped-def]
         remember_nose(s)
     elif since_s > WIND_STRAIGHT_S and s.air_age_s <= AIR_LIFE_S:
         a = s.airspeed_m_s
-        blend_wind(s, 0.08, v[0] - a * f[0], v[1] - a * f[1], v[2] - a * f[2])
+        blend_wind(s, STRAIGHT_SHARE, v[0] - a * f[0], v[1] - a * f[1], v[2] - a * f[2])
+        if s.compass:
+            s.straight_share += STRAIGHT_SHARE * (1.0 - s.straight_share)
+
+
+@kernel
+def examine_wind(s):  # type: ignore[no-untyped-def]
+    """Set ``s.wind_known``, whether the wind is reported: no part of the original, which uses it in any case.
+
+    It is if the airspeeds in different directions confirm it (`estimator.blocks.wind`), or if it was learnt from a
+    measured airspeed along a nose that a compass gives.
+    """
+    check_wind(s, s.v_e_m_s[0], s.v_e_m_s[1], s.interval_s)
+    if s.straight_share > STRAIGHT_KNOWN and s.air_age_s <= AIR_LIFE_S:
+        s.wind_known = 1
 
 
 @kernel
@@ -60,4 +76,3 @@ def blend_wind(s, share, x, y, z):  # type: ignore[no-untyped-def]
     wind[0] += share * (x - wind[0])
     wind[1] += share * (y - wind[1])
     wind[2] += share * (z - wind[2])
-    s.wind_known = 1

@@ -1,5 +1,6 @@
 """Autopilots broken in one respect, for scenarios to notice: named ``broken_autopilots.py:Class``."""
 
+import math
 from dataclasses import replace
 
 from autopilot.airframes import params_of
@@ -74,6 +75,16 @@ class CruisesOn(DcmAutopilot):
         params = params_of(aircraft)
         slow = replace(params, energy=replace(params.energy, fastest_m_s=params.energy.airspeed_m_s))
         super().__init__(slow, heading_reference, aircraft)
+
+
+class FollowsTheCourse(DcmAutopilot):
+    """Circles at cruise speed whatever the wind, in the direction of the estimator's course."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        p = params_of(aircraft)
+        energy = replace(p.energy, fastest_m_s=p.energy.airspeed_m_s)
+        guidance = replace(p.guidance, blown=math.inf)
+        super().__init__(replace(p, energy=energy, guidance=guidance), heading_reference, aircraft)
 
 
 class _Mishears(DcmAutopilot):

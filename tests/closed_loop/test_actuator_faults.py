@@ -94,13 +94,13 @@ def test_slow_aileron_is_worse_the_slower():
     ],
 )
 def test_dead_motor_ends_in_a_landing(scenario, changes, seed):
-    """Whatever it was doing, and without fixes: down at less than 3 m/s, wings within 20 degrees of level."""
+    """Whatever it was doing, and without fixes: down at less than 3 m/s, wings within 25 degrees of level."""
     conditions = {"faults": ("motor:dead@30",), "duration_s": 230.0} | changes
     flight = fly_scenario(find(scenario), conditions, seed=seed)
     assert flight.outcome == Outcome.GROUND_CONTACT
     down = flight.log.truth[-6]
     assert down["v_e_m_s"][2] < 3.0
-    assert abs(np.degrees(np.arctan2(down["R_eb"][2, 1], down["R_eb"][2, 2]))) < 20.0
+    assert abs(np.degrees(np.arctan2(down["R_eb"][2, 1], down["R_eb"][2, 2]))) < 25.0
 
 
 def test_events_name_the_fault_and_its_end():

@@ -32,6 +32,7 @@ CLIMBS_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:ClimbsOn"}
 FLIES_THROUGH_THE_FENCE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FliesThroughTheFence"}
 LOOKS_TOO_LATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:LooksAtTheFenceTooLate"}
 BELIEVES_EVERY_FIX = {"autopilot": f"{BROKEN_AUTOPILOTS}:BelievesEveryFix"}
+FOLLOWS_THE_COURSE = {"autopilot": f"{BROKEN_AUTOPILOTS}:FollowsTheCourse"}
 CRUISES_ON = {"autopilot": f"{BROKEN_AUTOPILOTS}:CruisesOn"}
 NEVER_INVERTED = {"autopilot": f"{BROKEN_AUTOPILOTS}:NeverInverted"}
 HALF_THE_RATE = {"autopilot": f"{BROKEN_AUTOPILOTS}:HalfTheRate"}
@@ -112,6 +113,8 @@ MUTATIONS = (
     Mutation("launch_no_gps", "premerlani", CLIMBS_ON, "greatest height"),
     Mutation("loiter_gps_stuck", "gyro_only", {}, "survived"),
     Mutation("loiter_gps_stuck", "premerlani", BELIEVES_EVERY_FIX, "circled"),
+    Mutation("loiter_wind", "premerlani", FOLLOWS_THE_COURSE, "greatest distance from the centre"),
+    Mutation("loiter_wind_nose", "gps_velocity_nose", CRUISES_ON, "heading error RMS"),
     Mutation("loops", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("loops_outside", "premerlani", WEAK_FEEDBACK, "inclination error RMS"),
     Mutation("motor_dead", "premerlani", IGNORES_THE_ELEVATOR, "angle of attack"),

@@ -80,7 +80,7 @@ def test_every_receiver_is_known_as_its_part_file_says(suite):
     assert record["use_airspeed"].value is (SUITES[suite].airspeed is not None)
     pilot = equipped_autopilot("dcm", "course", "endurance", record)
     assert pilot.code.params.guidance.gps_filter_s == gps.filter_s
-    assert pilot.known.keys() == {"gps_filter_s"}
+    assert pilot.known.keys() == {"gps_filter_s", "elevation_m"}
 
 
 @pytest.mark.parametrize("suite", sorted(SUITES))

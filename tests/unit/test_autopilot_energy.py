@@ -140,8 +140,21 @@ def test_headwind_is_seen_from_the_wind_or_from_the_ground_speed(towards, ground
     """Flying north over the ground with 12.6 m/s of airspeed."""
     s = state()
     for _ in range(500):
-        believe_headwind(*towards, wind, row_of(v_e_m_s=(ground_m_s, 0.0, 0.0)), s, record(), DT_S)
+        believe_headwind(*towards, 0, wind, row_of(v_e_m_s=(ground_m_s, 0.0, 0.0)), s, record(), DT_S)
     np.testing.assert_allclose(s["headwind_m_s"], expected, rtol=0, atol=0.01)
+
+
+@pytest.mark.parametrize("course_deg", [0.0, 70.0, 180.0])
+@pytest.mark.parametrize("wind", [UNKNOWN, np.array([0.0, 8.0, 0.0])])
+def test_headwind_of_a_circle_is_the_whole_wind(course_deg, wind):
+    """8 m/s to the east: on any course, once it was flown with the wind, or if an estimator knows it."""
+    s = state()
+    for deg, seconds in ((90.0, 5.0), (course_deg, 3.0)):
+        air = CRUISE_M_S * np.exp(1j * math.radians(deg)) + 8.0j
+        for _ in range(round(seconds / DT_S)):
+            believe_headwind(0.0, 0.0, 1, wind, row_of(v_e_m_s=(air.real, air.imag, 0.0)), s, record(), DT_S)
+    np.testing.assert_allclose(s["headwind_m_s"], 8.0, rtol=0, atol=0.2)
+    np.testing.assert_allclose(s["wind_seen_e_m_s"], [0.0, 8.0], rtol=0, atol=0.2)
 
 
 @pytest.mark.parametrize(("asked_m_s", "wanted_m_s"), [(15.0, 15.0), (2.0, 1.2 * PARAMS.stall_m_s), (90.0, 18.0)])

@@ -63,7 +63,7 @@ def wrapped(rad):
 @given(flown=course, wanted=course, pitch=st.floats(-1.5, 1.5), roll=angle)
 def test_heading_error_any_attitude_equals_the_wrapped_course_difference(flown, wanted, pitch, roll):
     """Cross and dot product of the nose vector give the sine and cosine of the difference, also inverted."""
-    north, east = direction_of_travel(nose(flown, pitch, roll), UNKNOWN, row_of(valid=0), state(), 0, record())
+    north, east = direction_of_travel(nose(flown, pitch, roll), UNKNOWN, row_of(valid=0), state(), 0, 0, record())
     sine, cosine = heading_error(north, east, math.cos(wanted), math.sin(wanted))
     # The nose is 0.07 long over the ground at the steepest: 4 eps of a matrix over that, and some of the angles.
     np.testing.assert_allclose(wrapped(math.atan2(sine, cosine) - (wanted - flown)), 0.0, rtol=0, atol=1e-13)
@@ -94,7 +94,7 @@ def test_direction_of_travel_nose_with_wind_is_the_wind_triangle(heading, blows_
     """Nose times airspeed plus wind, as complex numbers."""
     wind = speed * np.array([math.cos(blows_to), math.sin(blows_to), 0.0])
     over_ground = CRUISE_M_S * np.exp(1j * heading) + speed * np.exp(1j * blows_to)
-    north, east = direction_of_travel(nose(heading), wind, row_of(), state(), 1, record())
+    north, east = direction_of_travel(nose(heading), wind, row_of(), state(), 1, 0, record())
     # 3.6 m/s are left of 12.6 against 9: some eps of the sum of both over that.
     np.testing.assert_allclose(north + 1j * east, over_ground / abs(over_ground), rtol=0, atol=1e-13)
 
@@ -104,7 +104,7 @@ def test_direction_of_travel_blown_backwards_keeps_the_nose_in_front(speed):
     """Wind above the airspeed, dead ahead or on the bow: one is blown back, and still not taken for flying back."""
     for off in (0.0, 0.6, -0.6):
         wind = -speed * np.array([math.cos(off), math.sin(off), 0.0])
-        north, east = direction_of_travel(nose(0.0), wind, row_of(), state(), 1, record())
+        north, east = direction_of_travel(nose(0.0), wind, row_of(), state(), 1, 0, record())
         assert north > 0.0
         assert abs(math.atan2(east, north)) < 1.2
 
@@ -121,13 +121,13 @@ def test_direction_of_travel_nose_without_wind_is_the_gps_velocity_turned_on():
     """The GPS saw north-east; 0.5 rad to the right have been turned since."""
     s = state()
     s["unseen_turn_rad"] = 0.5
-    north, east = direction_of_travel(nose(0.0), UNKNOWN, row_of(v_e_m_s=(7.0, 7.0, 0.0)), s, 1, record())
+    north, east = direction_of_travel(nose(0.0), UNKNOWN, row_of(v_e_m_s=(7.0, 7.0, 0.0)), s, 1, 0, record())
     np.testing.assert_allclose(math.atan2(east, north), math.pi / 4 + 0.5, rtol=0, atol=1e-12)
 
 
 def test_direction_of_travel_nose_with_neither_wind_nor_gps_is_the_nose():
     """Nothing else is known."""
-    north, east = direction_of_travel(nose(2.0), UNKNOWN, row_of(valid=0), state(), 1, record())
+    north, east = direction_of_travel(nose(2.0), UNKNOWN, row_of(valid=0), state(), 1, 0, record())
     np.testing.assert_allclose(math.atan2(east, north), 2.0, rtol=0, atol=1e-12)
 
 
@@ -200,3 +200,24 @@ def test_bank_to_return_any_wind_passes_the_launch_point_again_and_again(from_de
     passes = np.flatnonzero(near[1:] & ~near[:-1])
     assert len(passes) >= 3
     assert passes[0] * 0.02 < 60.0
+
+
+@pytest.mark.parametrize("nose_deg", range(0, 360, 30))
+@pytest.mark.parametrize("known", [False, True])
+def test_direction_of_travel_in_strong_wind_follows_the_nose_and_not_the_course(nose_deg, known):
+    """11 m/s to the east, the estimator's course the wrong way round: the triangle of nose and limited wind."""
+    s, air = state(), CRUISE_M_S * np.exp(1j * math.radians(nose_deg))
+    s["wind_seen_e_m_s"] = (0.0, 0.0) if known else (0.0, 11.0)
+    s["unseen_turn_rad"] = 0.5  # turned on since the fix
+    wind = np.array([0.0, 11.0, 0.0]) if known else UNKNOWN
+    row = row_of(v_e_m_s=(air.real, air.imag + 11.0, 0.0))
+    north, east = direction_of_travel(nose(math.radians(nose_deg + 180.0)), wind, row, s, 0, 1, record())
+    expected = air * np.exp(0.5j) + PARAMS.wind_share * CRUISE_M_S * 1j
+    np.testing.assert_allclose(complex(north, east), expected / abs(expected), rtol=0, atol=1e-9)
+
+
+def test_direction_of_travel_in_strong_wind_without_gps_is_the_estimate():
+    s = state()
+    s["wind_seen_e_m_s"] = 0.0, 11.0
+    north, east = direction_of_travel(nose(1.0), UNKNOWN, row_of(valid=0), s, 0, 1, record())
+    assert (north, east) == pytest.approx((math.cos(1.0), math.sin(1.0)))

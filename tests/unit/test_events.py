@@ -67,3 +67,33 @@ def test_events_of_modes_that_were_asked_for_are_no_warnings():
     log.flown["mode"][:100], log.flown["mode"][100:] = Mode.CIRCLE, Mode.RETURN
     script = Script([(0.0, Setpoint(Mode.CIRCLE)), (2.0, Setpoint(Mode.RETURN))])
     assert {e.level for e in events_of(log, Outcome.COMPLETED, "", script, 0.0)} == {"info"}
+
+
+def windy(airspeed_m_s, mode=Mode.LOITER):
+    """Events about the wind of a minute in 14 m/s, with an airspeed and a mode by second."""
+    log = log_of(60)
+    log.truth["wind_e_m_s"] = 0.0, -14.0, 0.0
+    log.truth["airspeed_m_s"] = np.repeat(airspeed_m_s, 50)
+    log.flown["mode"] = np.repeat(mode, 50) if np.ndim(mode) else mode
+    return [(e.text, e.level, round(e.t_s)) for e in events_of(log, Outcome.COMPLETED, "") if "wind" in e.text]
+
+
+def test_events_say_when_the_wind_cannot_be_held():
+    """The mean of 20 s decides: not a gust, and not in a mode that goes with the wind."""
+    assert windy(np.full(60, 15.0)) == []
+    assert windy(np.where(np.arange(60) % 20 < 5, 12.0, 15.0)) == []
+    assert windy(np.full(60, 12.0), Mode.COURSE) == []
+    assert windy(np.full(60, 12.0)) == [("wind stronger than can be held", "warn", 20)]
+
+
+def test_events_say_when_the_wind_can_be_held_again():
+    """Flown faster from 25 s on, the mean is more than 1 m/s above the wind 7.5 s to 12 s later, and stays there."""
+    texts = windy(np.where(np.arange(60) < 25, 12.0, 18.0))
+    assert [text for text, *_ in texts] == ["wind stronger than can be held", "wind can be held again"]
+    assert 32 <= texts[1][2] <= 37
+
+
+def test_events_compare_wind_and_airspeed_only_while_a_place_is_held():
+    """A loiter that begins after half a minute on course is judged by its own 20 s."""
+    mode = np.where(np.arange(60) < 30, Mode.COURSE, Mode.LOITER)
+    assert windy(np.full(60, 12.0), mode) == [("wind stronger than can be held", "warn", 50)]

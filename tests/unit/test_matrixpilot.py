@@ -141,7 +141,6 @@ def test_wind_is_found_from_pairs_of_reports_and_noses():
         R = from_euler(0.5, 0.1, math.radians(60.0 * pair))
         state["R_eb"], state["v_e_m_s"] = R, 14.0 * R[:, 0] + wind
         call_learn_wind(state)
-        assert state["wind_known"][0] == (pair > 0)
         expected = wind * (1.0 - (15.0 / 16.0) ** pair)
         np.testing.assert_allclose(state["wind_e_m_s"][0], expected, rtol=0, atol=1e-12)
 
@@ -179,11 +178,19 @@ def test_wind_from_any_direction_is_found_in_circles(from_deg):
 def test_wind_is_not_measured_before_the_nose_has_turned():
     """Noses 20 degrees apart (a change of 0.35) tell nothing; the pair waits for its second half."""
     state = MatrixPilot().snapshot()
-    for heading_deg, known in ((0.0, 0), (20.0, 0), (25.0, 1)):
+    for heading_deg, measured in ((0.0, False), (20.0, False), (25.0, True)):
         state["R_eb"] = from_euler(0.0, 0.0, math.radians(heading_deg))
-        state["v_e_m_s"] = 10.0 * state["R_eb"][0][:, 0]
+        state["v_e_m_s"] = 10.0 * state["R_eb"][0][:, 0] + [0.0, 2.0, 0.0]
         call_learn_wind(state)
-        assert state["wind_known"][0] == known
+        assert (state["wind_e_m_s"][0, 1] != 0.0) == measured
+
+
+def test_wind_of_a_heading_found_late_in_straight_flight_is_not_reported():
+    """Ahead into 6 m/s, yaw 120 degrees off at first: the turn of the matrix looks like a wind."""
+    rows = with_gps(motion(60.0), np.array([12.6 - 6.0, 0.0, 0.0]))
+    estimator = started(MatrixPilotParams(), R_eb=from_euler(0.0, 0.0, math.radians(120.0)))
+    assert np.all(np.isnan(estimator.replay(rows)["wind_e_m_s"]))
+    assert np.hypot(*estimator.snapshot()["wind_e_m_s"][0, :2]) > 0.5
 
 
 def test_yaw_meets_the_velocity_through_the_air_once_the_wind_is_known():

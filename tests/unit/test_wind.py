@@ -10,6 +10,7 @@ from estimator.blocks.compiled import BELIEF
 from estimator.interface import dtype_of
 
 STATE = dtype_of((*BELIEF, *wind.WIND_FILTER))
+CHECKED = dtype_of((*BELIEF, *wind.WIND_CHECK))
 
 
 @wind.kernel
@@ -159,3 +160,74 @@ def test_learn_wind_equals_a_plain_kalman_filter_with_and_without_surprises(dt_s
         np.testing.assert_allclose(found, [w, c, P[0, 1]], rtol=0, atol=1e-9)
         np.testing.assert_allclose([s["wind_variance"], s["air_variance"]], np.diag(P).real, rtol=0, atol=1e-9)
     assert refused > 0
+
+
+@wind.kernel
+def check(state, v, dt_s):
+    """`check_wind` over many fixes; `v` is complex, north + i east."""
+    for velocity in v:
+        wind.check_wind(state[0], velocity.real, velocity.imag, dt_s)
+
+
+@wind.kernel
+def by_speed(state):
+    """`wind_by_speed` of the state."""
+    return wind.wind_by_speed(state[0])
+
+
+def checked(v, believed, dt_s=0.25):
+    """State after fixes with the ground velocities `v`, in which the estimator believes the wind `believed`."""
+    state = np.zeros(1, CHECKED)
+    state["wind_e_m_s"][0, :2] = believed.real, believed.imag
+    check(state, np.asarray(v, complex), dt_s)
+    return state
+
+
+CIRCLES = 12.6 * np.exp(1j * np.linspace(0.3, 0.3 + 8 * math.pi, 240))  # four in a minute, 4 Hz
+AHEAD = np.full(240, 12.6 + 0.0j)
+
+
+@pytest.mark.parametrize("true_wind", [0.0j, 6.0 + 0.0j, -4.0 + 9.0j, 14.0j])
+def test_wind_by_speed_in_circles_is_the_wind(true_wind):
+    """Closed form: a constant airspeed in all directions gives the wind to round-off, also one above the airspeed."""
+    north, east, sigma_m_s = by_speed(checked(CIRCLES + true_wind, true_wind))
+    assert abs(complex(north, east) - true_wind) < 1e-6
+    # Of a circle the smaller variance is V^2 / 2: sigma sqrt(2 / n), n the weight of a minute that is forgotten.
+    n = wind.CHECK_S * (1.0 - math.exp(-60.0 / wind.CHECK_S))
+    speed = max(12.6, math.sqrt(np.mean(np.abs(CIRCLES + true_wind) ** 2)))
+    assert sigma_m_s == pytest.approx(speed / 12.6 * math.sqrt(2.0 / n), rel=0.05)
+
+
+@pytest.mark.parametrize("true_wind", [6.0 + 0.0j, -6.0 + 0.0j, 6.0j, 11.0 + 0.0j])
+def test_check_wind_straight_ahead_confirms_nothing(true_wind):
+    """Head, tail and cross wind: not even the right wind, with noise of the receiver and a heading that wanders."""
+    rng = np.random.default_rng(1)
+    wander = np.exp(1j * np.radians(4.0) * np.sin(np.arange(240) / 30.0))
+    noise = 0.1 * (rng.standard_normal(240) + 1j * rng.standard_normal(240))
+    for believed in (true_wind, 0.4 + 0.0j, AHEAD[0] + true_wind):
+        assert checked(AHEAD * wander + true_wind + noise, believed)["wind_known"][0] == 0
+
+
+@pytest.mark.parametrize("off", [2.0 + 0.0j, -1.4j, 5.0 - 5.0j])
+def test_check_wind_confirms_the_right_wind_and_no_other(off):
+    """After circles, the wind is confirmed within 1 m/s; one that is wrong by more is not."""
+    v = CIRCLES + (5.0 - 2.0j)
+    assert checked(v, 5.0 - 2.0j)["wind_known"][0] == 1
+    assert checked(v, 5.3 - 2.5j)["wind_known"][0] == 1
+    assert checked(v, 5.0 - 2.0j + off)["wind_known"][0] == 0
+
+
+def test_check_wind_needs_a_steady_airspeed():
+    """With an airspeed that goes up and down by a sixth, every 12 s, the speeds tell no wind."""
+    v = CIRCLES * (1.0 + np.sin(np.arange(240) / 7.6) / 6.0) + 5.0
+    state = checked(v, 5.0 + 0.0j)
+    assert math.isinf(by_speed(state)[2])
+    assert state["wind_known"][0] == 0
+
+
+def test_check_wind_forgets_in_straight_flight():
+    """Five minutes straight ahead after the circles: the wind is no longer confirmed."""
+    state = checked(CIRCLES + 5.0, 5.0 + 0.0j)
+    assert state["wind_known"][0] == 1
+    check(state, np.full(1200, 17.6 + 0.0j), 0.25)
+    assert state["wind_known"][0] == 0

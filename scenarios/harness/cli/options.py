@@ -111,11 +111,12 @@ FaultOption = Annotated[
         help="gyro.x:stuck@20-25 (s after the release), gps:outage@10 (to the end), gps:jump=50,-30@10-20 (m north, "
         "east); may be repeated. gyro, accelerometer, magnetometer (or an axis), airspeed, barometer: stuck, dropout, "
         "nan, spikes, bias, gain, saturated. gps: outage, stuck, frozen_position, frozen_velocity, "
-        "frozen_course, jump, drift, rate, whole_degrees, nan, spikes. aileron, elevator, rudder: stuck "
+        "frozen_course, jump, drift, rate, whole_degrees, nan, spikes. imu: dropped. aileron, elevator, rudder: stuck "
         "(or stuck=0.3), slow, slack, reversed, lost. motor: dead, weak, stuck. Default values: "
         "bias=5 deg/s, 0.2 g, 10 uT, 3 m/s, 10 m; spikes=200,0.02 for 200 deg/s in 2% of the readings, 2 g in 2%, "
         "50 uT, 10 m/s, 50 m in 10%; gain=0.5; saturated=1 (or -1); jump=50,0; drift=1,0 (m/s); rate=1 (Hz); "
-        "slow=0.5 (full deflections per second); slack=0.1 (of full deflection); weak=0.6 (of the voltage).",
+        "dropped=0.05 (of the samples); slow=0.5 (full deflections per second); slack=0.1 (of full deflection); "
+        "weak=0.6 (of the voltage).",
     ),
 ]
 JsonOption = Annotated[

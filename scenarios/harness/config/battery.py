@@ -24,8 +24,12 @@ class BatteryConfig(BaseModel):
 
     @model_validator(mode="after")
     def _has_a_capacity(self) -> "BatteryConfig":
-        if self.capacity_mah is None and self != type(self).model_construct():
-            raise ValueError("the voltage is constant without a capacity: set battery.capacity_mah as well, in mAh")
+        changed = [name for name, field in type(self).model_fields.items() if getattr(self, name) != field.default]
+        if self.capacity_mah is None and changed:
+            raise ValueError(
+                f"battery.{changed[0]} = {getattr(self, changed[0]):g}: without a capacity the voltage is constant; "
+                "set battery.capacity_mah as well, in mAh"
+            )
         return self
 
     def require_possible(self, aircraft: str, flies: bool) -> None:
