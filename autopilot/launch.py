@@ -42,7 +42,7 @@ class LaunchParams:
         default 2).  Higher: more speed before the climb
     level_off_m : the height loop takes over this far below the height (m, default 5).  Higher: smoother, slower
     climb_pitch_rad : pitch of the climb (rad, default 12 deg).  Higher: steeper and slower, up to the stall
-    alpha_rad : largest angle of attack while it gathers speed, by inertial reckoning (rad, default 13.5 deg).  Higher:
+    alpha_rad : largest angle of attack while it gathers speed, by inertial reckoning (rad, default 13 deg).  Higher:
         a slow throw stalls; lower: it sinks more
     alpha_gain_1_s : pitch rate allowed per angle left below that (1/s, default 13).  Higher: the nose drops later
         and faster
@@ -58,7 +58,7 @@ class LaunchParams:
     full_throttle_s: float = 2.0
     level_off_m: float = 5.0
     climb_pitch_rad: float = math.radians(12.0)
-    alpha_rad: float = math.radians(13.5)
+    alpha_rad: float = math.radians(13.0)
     alpha_gain_1_s: float = 13.0
 
 
