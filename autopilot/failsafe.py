@@ -92,7 +92,7 @@ class FailsafeParams:
     unhealthy_s : time POOR until the estimator is no longer trusted, and GOOD until it is again (s, default 5).
         Higher: flies longer on a bad attitude; lower: reacts to short disturbances
     apart_rad, apart_s : difference from the standby attitude, and its time, at which a POOR estimator is distrusted
-        sooner (rad and s, default 30 deg and 0.5).  Higher: follows a wrong attitude further; lower: false alarms
+        sooner (rad and s, default 20 deg and 0.5).  Higher: follows a wrong attitude further; lower: false alarms
     kept_s : time since the last healthy estimate in which that difference counts (s, default 10).  Higher: an estimator
         that recovers is distrusted for the drift of the gyros
     level_s : time in LEVEL without radio link before the motor is switched off (s, default 60).  Higher: waits longer,
@@ -114,7 +114,7 @@ class FailsafeParams:
     bank_rad: float = math.radians(10.0)
     glide_pitch_rad: float = math.radians(-4.0)
     unhealthy_s: float = 5.0
-    apart_rad: float = math.radians(30.0)
+    apart_rad: float = math.radians(20.0)
     apart_s: float = 0.5
     kept_s: float = 10.0
     level_s: float = 60.0
@@ -170,15 +170,17 @@ def examine(R_eb, gyro_bias_b_rad_s, wind_e_m_s, health, known, row, s, p, dt_s)
     p : record of AutopilotParams
     """
     f, g = p.failsafe, p.guidance
-    poor = health == POOR and s.heard_s >= f.gps_back_s and math.isfinite(gps_age(row, g)) and has_course(row, f)
+    poor = health == POOR and s.heard_s >= f.gps_back_s and math.isfinite(gps_age(row, g))
     if not known or (poor and s.healthy_once and apart(R_eb, s, f)):
         s.apart_s += dt_s
     else:
         s.apart_s = 0.0
     if known and health == GOOD:
         s.poor_s = max(s.poor_s - dt_s, 0.0)
-    elif not known or poor:
-        s.poor_s = f.unhealthy_s if s.apart_s > f.apart_s else min(s.poor_s + dt_s, f.unhealthy_s)
+    elif s.apart_s > f.apart_s:
+        s.poor_s = f.unhealthy_s
+    elif not known or (poor and has_course(row, f)):
+        s.poor_s = min(s.poor_s + dt_s, f.unhealthy_s)
     if s.poor_s == 0.0:
         s.believed = 1
     elif s.poor_s == f.unhealthy_s and s.healthy_once:
@@ -273,7 +275,7 @@ def mode_in_force(setpoint, height_m, row, s, p, dt_s):  # type: ignore[no-untyp
         return mode, mode
     if s.unheard_s > f.return_s and navigates:
         return GLIDE, GLIDE
-    guarded = navigates or mode == STABILISE or (mode == LAUNCH and height_m > f.safe_height_m)
+    guarded = navigates or mode == STABILISE or (mode == LAUNCH and not in_hand and height_m > f.safe_height_m)
     if guarded and mode != RETURN and s.heard_s >= f.gps_back_s:
         mind_fence(row, height_m, s, p.fence, p.guidance, p.energy.airspeed_m_s)
         if s.fenced:

@@ -11,8 +11,10 @@ from autopilot.dcm import DcmAutopilot
 from autopilot.failsafe import FailsafeParams
 from autopilot.interface import Mode, Setpoint
 from autopilot.pilot import Script
+from autopilot.standby import StandbyParams
 from estimator.interface import Health
 from estimator.premerlani import Premerlani, PremerlaniParams
+from scenarios.harness.flight import fly_scenario
 from sim.aeroplane.jsbsim_plant import JsbsimPlant
 from sim.air import Air
 from sim.clock import Rates
@@ -126,6 +128,102 @@ def test_unhealthy_estimator_would_crash_who_believes_it(monkeypatch):
     """What the test above tells apart."""
     without_level(monkeypatch)
     assert flown([(0.0, AHEAD)], 140.0, estimator=FallsIll(KNOWN)).outcome == Outcome.GROUND_CONTACT
+
+
+class IllEarly(Premerlani):
+    """POOR from 20 s on, before the gyro offset is learnt; `attitude` is then what it says."""
+
+    def __init__(self, attitude):
+        super().__init__(KNOWN)
+        self._attitude = attitude
+
+    def update(self, m):
+        estimate, t_s = super().update(m), m.imu.t_s
+        if t_s < 20.0:
+            return estimate
+        return estimate._replace(R_eb=self._attitude(estimate.R_eb, t_s), health=Health.POOR)
+
+
+ILLNESSES = {
+    "stays as it was": lambda R_eb, _t: R_eb,
+    "upside down": lambda R_eb, _t: R_eb @ np.diag([1.0, -1.0, -1.0]),
+    "constant": lambda _R, _t: np.eye(3),
+    "tumbles slowly": lambda R_eb, t_s: Rotation.from_euler("x", 0.2 * (t_s - 20.0)).as_matrix() @ R_eb,
+    "garbage": lambda _R, t_s: Rotation.from_euler("ZYX", [t_s, 0.4 * math.sin(t_s), 2.0 + t_s]).as_matrix(),
+}
+
+
+@pytest.mark.parametrize(("illness", "seed"), list(zip(ILLNESSES, (1, 2, 1, 2, 1), strict=True)))
+def test_estimator_ill_before_it_learnt_its_offset_flies_on_level(illness, seed):
+    """No calibration, POOR after 20 s, whatever it says: a minute and a half with wings level at its height."""
+    flight = flown([(0.0, AHEAD)], 110.0, estimator=IllEarly(ILLNESSES[illness]), seed=seed)
+    assert flight.outcome == Outcome.COMPLETED
+    assert modes(flight)[-1] == Mode.LEVEL
+    assert heights_m(flight).min() > 60.0
+    assert abs(bank_deg(flight)[2000:]).max() < 12.0
+
+
+def test_level_on_the_gyros_alone_would_crash(monkeypatch):
+    """What the test above tells apart: the last offset of the estimator is not that of the gyros."""
+    still = StandbyParams(tilt_gain_1_s=0.0, tilt_offset_1_s2=0.0, yaw_gain_1_s=0.0, yaw_offset_1_s2=0.0)
+    alone = replace(DcmAutopilot().params, standby=still)
+    monkeypatch.setattr("autopilot.dcm.params_of", lambda _aircraft: alone)
+    flight = flown([(0.0, AHEAD)], 110.0, estimator=IllEarly(ILLNESSES["stays as it was"]), seed=1)
+    assert flight.outcome == Outcome.GROUND_CONTACT
+
+
+@pytest.mark.parametrize("lacking", ["gps", "radio", "both"])
+def test_estimator_ill_and_nobody_to_help_lands_wings_level(lacking):
+    """Motor off after half a minute without GPS, or a minute without radio; down within two minutes, gently."""
+    faults = [] if lacking == "radio" else [Fault("gps", "outage", (), 40.0, math.inf)]
+    script = [(0.0, AHEAD)] if lacking == "gps" else [(0.0, AHEAD), (30.0, replace(AHEAD, radio=False))]
+    flight = flown(script, 220.0, estimator=IllEarly(ILLNESSES["garbage"]), faults=faults, height_m=60.0, seed=1)
+    assert flight.outcome == Outcome.GROUND_CONTACT
+    assert modes(flight) == [Mode.COURSE, Mode.LEVEL, Mode.LAND]
+    land = flight.log.flown["mode"] == Mode.LAND
+    assert abs(bank_deg(flight)[land]).max() < 15.0
+    assert np.all(flight.log.truth["throttle"][land][50:] < 0.01)
+    assert flight.log.truth["v_e_m_s"][-1, 2] < 3.0
+    assert "mode land: estimator unhealthy, and no GPS or no radio" in {e.text for e in flight.events}
+
+
+def test_launch_that_never_has_a_fix_comes_down_nearby():
+    """A climb that ends, half a minute of circle, a glide: on the ground within three minutes, not 300 m up."""
+    plain = {"faults": "gps:outage@-60-", "duration_s": 170.0}
+    flight = fly_scenario("launch_no_gps", plain, seed=0)
+    assert flight.outcome == Outcome.GROUND_CONTACT
+    assert modes(flight)[-3:] == [Mode.LAUNCH, Mode.CIRCLE, Mode.GLIDE]
+    assert heights_m(flight).max() < 75.0
+    p = flight.log.truth["p_e_m"]
+    assert np.hypot(p[:, 0], p[:, 1]).max() < 600.0
+    assert flight.log.truth["v_e_m_s"][-1, 2] < 3.5
+
+
+@pytest.mark.parametrize(("action", "mode"), [("loiter", Mode.LOITER), ("glide", Mode.GLIDE)])
+def test_fence_actions_last_until_another_setpoint_is_commanded(action, mode):
+    """Around the launch point, or down with the motor off; not back to the course that led out of the fence."""
+    flight = fly_scenario("fence", {"fence.action": action, "duration_s": 70.0}, seed=0)
+    assert modes(flight) == [Mode.COURSE, mode]
+    p = flight.log.truth["p_e_m"]
+    assert np.hypot(p[:, 0], p[:, 1]).max() < (260.0 if action == "loiter" else 700.0)
+    assert f"mode {action}: the fence" in {e.text for e in flight.events}
+
+
+def test_fence_that_is_only_reported_changes_nothing_but_the_events():
+    """Bit for bit the flight without a fence."""
+    reported = fly_scenario("fence", {"fence.action": "report", "duration_s": 30.0}, seed=0)
+    none = fly_scenario("crosswind", {"wind": "5@tail", "start.height_m": 80.0, "manoeuvre.height_m": 80.0,
+                                      "duration_s": 30.0, "air.turbulence_w20_m_s": 3.0}, seed=0)  # fmt: skip
+    np.testing.assert_array_equal(reported.log.truth["p_e_m"], none.log.truth["p_e_m"])
+    assert {("outside the fence", "warn")} <= {(e.text, e.level) for e in reported.events}
+
+
+def test_fence_ceiling_limits_the_height_that_is_commanded():
+    """Commanded to climb to 150 m under a ceiling of 110 m: it stays under it."""
+    changes = {"fence.radius_m": 2000.0, "fence.height_m": 110.0, "manoeuvre.height_m": 150.0}
+    flight = fly_scenario("fence", changes, seed=1)
+    assert heights_m(flight).max() < 110.0
+    np.testing.assert_allclose(heights_m(flight)[-500:].mean(), 100.0, rtol=0, atol=4.0)
 
 
 def test_low_height_climbs_straight_before_it_turns():
