@@ -17,6 +17,7 @@ from estimator.compiler.jit import kernel
 from estimator.interface import G_M_S2
 from estimator.params.shared import FORCE_RANGE_M_S2
 
+TAIL_WIND_M_S = 1.0  # assumed in a launch, for with less airspeed than believed it stalls
 SLOWEST_THROW_M_S = 3.0  # a slower one has no angle of attack to speak of
 
 
@@ -41,7 +42,7 @@ class LaunchParams:
         default 2).  Higher: more speed before the climb
     level_off_m : the height loop takes over this far below the height (m, default 5).  Higher: smoother, slower
     climb_pitch_rad : pitch of the climb (rad, default 12 deg).  Higher: steeper and slower, up to the stall
-    alpha_rad : largest angle of attack while it gathers speed, by inertial reckoning (rad, default 13.5 deg).  Higher:
+    alpha_rad : largest angle of attack while it gathers speed, by inertial reckoning (rad, default 13 deg).  Higher:
         a slow throw stalls; lower: it sinks more
     alpha_gain_1_s : pitch rate allowed per angle left below that (1/s, default 13).  Higher: the nose drops later
         and faster
@@ -57,7 +58,7 @@ class LaunchParams:
     full_throttle_s: float = 2.0
     level_off_m: float = 5.0
     climb_pitch_rad: float = math.radians(12.0)
-    alpha_rad: float = math.radians(13.5)
+    alpha_rad: float = math.radians(13.0)
     alpha_gain_1_s: float = 13.0
 
 
@@ -122,7 +123,7 @@ def climb_away(thrown_s, height_m, row, s, p, dt_s):  # type: ignore[no-untyped-
 
 @kernel
 def reckon_throw(R_eb, omega_b_rad_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
-    """Update the velocity along the nose and below it since the release, by inertial reckoning, in calm air.
+    """Update the velocity along the nose and below it since the push, by inertial reckoning.
 
     ``u' = f_x + g r_zx - q w`` and ``w' = f_z + g r_zz + q u`` (Etkin & Reid, section 4.4, without sideslip).  It
     drifts, but nothing else knows the speed in the first second: the GPS is late, and has no wind.
@@ -130,8 +131,8 @@ def reckon_throw(R_eb, omega_b_rad_s, row, s, p, dt_s):  # type: ignore[no-untyp
     R_eb : shape (3, 3)   omega_b_rad_s : shape (3,)   row : measured   p : record of AutopilotParams
     s : record with `ahead_m_s`, `below_m_s` and, unless measured, `airspeed_m_s`, updated
     """
-    if s.thrown_s <= 0.0:
-        s.ahead_m_s, s.below_m_s = s.gained_m_s, 0.0
+    if s.thrown_s < 0.0:
+        s.ahead_m_s, s.below_m_s = s.gained_m_s - TAIL_WIND_M_S, 0.0
         return
     f, q = row.force_b_m_s2, omega_b_rad_s[1]
     if not (abs(f[0]) <= FORCE_RANGE_M_S2 and abs(f[2]) <= FORCE_RANGE_M_S2):
@@ -139,6 +140,8 @@ def reckon_throw(R_eb, omega_b_rad_s, row, s, p, dt_s):  # type: ignore[no-untyp
     ahead_m_s2 = f[0] + G_M_S2 * R_eb[2, 0] - q * s.below_m_s
     below_m_s2 = f[2] + G_M_S2 * R_eb[2, 2] + q * s.ahead_m_s
     s.ahead_m_s += ahead_m_s2 * dt_s
+    if s.thrown_s <= 0.0:  # the hand keeps it on the line of the nose
+        return
     s.below_m_s += below_m_s2 * dt_s
     if s.air_left_s <= 0.0:
         s.airspeed_m_s = clip(s.ahead_m_s / s.true_factor, SLOWEST * p.energy.airspeed_m_s, p.energy.airspeed_m_s)

@@ -29,8 +29,9 @@ class InFlight:
 class HandThrow:
     """Start in a swaying hand at the launch point, pushed along the body x axis and released.
 
-    heading_rad, pitch_rad : attitude of the throw          height_m : of the hand
-    hold_s : time in the hand since power-up                push_m_s2, push_s : acceleration and duration of the push
+    heading_rad, pitch_rad, roll_rad : attitude of the throw    height_m : of the hand
+    hold_s : time in the hand since power-up                push_m_s2, push_s : acceleration and duration of the push;
+    below 0 it is thrown tail first
     sway_rad_s, sway_hz, sway_phase_rad : (3,) roll, pitch and yaw rates of the hand, a_i sin(2 pi f_i t + phase_i)
     release_rate_b_rad_s : (3,) body rates at the end of the push
     """
@@ -45,6 +46,7 @@ class HandThrow:
     hold_s: float = 8.0
     push_m_s2: float = 27.0
     push_s: float = 0.3
+    roll_rad: float = 0.0
 
 
 Start = InFlight | HandThrow

@@ -19,7 +19,7 @@ def check(start: HandThrow) -> None:
         raise ValueError(f"sway_hz {start.sway_hz} Hz: must be above 0 (for no sway set sway_rad_s to 0)")
     for what, value, unit in (
         ("hold_s", start.hold_s, "s"), ("push_s", start.push_s, "s"),
-        ("push_m_s2", start.push_m_s2, "m/s2"), ("height_m", start.height_m, "m"),
+        ("push_m_s2", abs(start.push_m_s2), "m/s2"), ("height_m", start.height_m, "m"),
     ):  # fmt: skip
         if not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{what} {value} {unit}: must be above 0")
@@ -30,7 +30,7 @@ def sway(start: HandThrow, t_s: float) -> tuple[tuple[float, float, float], tupl
 
     The Euler rates are ``a sin(2 pi f t + phase)``; the angles are their integral about the attitude of the throw.
     """
-    angles = [0.0, start.pitch_rad, start.heading_rad]
+    angles = [start.roll_rad, start.pitch_rad, start.heading_rad]
     rates = [0.0, 0.0, 0.0]
     for i in range(3):
         w = 2.0 * math.pi * start.sway_hz[i]

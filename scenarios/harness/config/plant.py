@@ -64,8 +64,9 @@ def build_start(config: FlightConfig) -> Start:
         _radians(hand.release_rate_deg_s),
         start.height_m,
         start.hold_s,
-        start.push_m_s2,
+        -start.push_m_s2 if start.backwards else start.push_m_s2,
         start.push_s,
+        math.radians(start.roll_deg),
     )
 
 

@@ -40,6 +40,8 @@ class HandMotion(_Model):
 class HandThrowStart(_Model):
     """Start in the hand at the launch point, then a throw.
 
+    roll_deg : bank in the hand and of the throw; the wings are level at 0
+    backwards : thrown tail first: the push is against the nose
     height_m : of the hand above the ground; above arm's length it is a throw off a slope
     sway_deg_s : largest rate of the hand about each axis     release_rate_deg_s : sigma of the twist, each axis
     hand : "random" draws the motion from these two; a resolved configuration holds what was drawn
@@ -49,6 +51,8 @@ class HandThrowStart(_Model):
     kind: Literal["hand_throw"] = "hand_throw"
     heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | Chance = "random"
     pitch_deg: float = Field(default=15.0, ge=-30.0, le=60.0)
+    roll_deg: float = Field(default=0.0, ge=-90.0, le=90.0)
+    backwards: bool = False
     height_m: float = Field(default=1.7, gt=0.0, le=300.0)
     hold_s: float = Field(default=8.0, gt=0.0, le=600.0)
     push_m_s2: float = Field(default=27.0, gt=0.0, le=100.0)
