@@ -17,6 +17,7 @@ from sim.log import Outcome
 
 SEEDS = (0, 1)
 NO_OFFSET = {"estimator_params.k_i": 0}
+NO_OFFSET_EVER = {"estimator_params.k_i": 0, "estimator_params.learn_held_s": 0}
 NO_LAG_FILTER = {"estimator_params.gps_lag_filter": "false", "estimator_params.rotate_history": "false"}
 WEAK_FEEDBACK = {"estimator_params.w_rp": 0.05}
 TRUSTS_FORCE = {"estimator_params.w_rp": 3.0}
@@ -60,9 +61,9 @@ MUTATIONS = (
     Mutation("circle", "gyro_only", {}, "heading error RMS"),
     Mutation("circle", "premerlani", NO_LAG_FILTER, "heading error RMS"),
     Mutation("cold_start", "gyro_only", {}, "survived"),
-    Mutation("cold_start", "premerlani", NO_OFFSET, "offset not learnt"),
+    Mutation("cold_start", "premerlani", NO_OFFSET_EVER, "offset not learnt"),
     Mutation("cold_start_moved", "accelerometer_only", {}, "survived"),
-    Mutation("cold_start_moved", "premerlani", NO_OFFSET, "inclination within 6 deg for good"),
+    Mutation("cold_start_moved", "premerlani", NO_OFFSET_EVER, "inclination within 6 deg for good"),
     Mutation("cold_start_no_gps", "premerlani", NO_YAW, "heading within 15 deg for good"),
     Mutation("crosswind", "gyro_only", {}, "survived"),
     Mutation("crosswind", "premerlani", NO_YAW, "heading error RMS"),
