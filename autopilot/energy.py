@@ -59,6 +59,10 @@ class EnergyParams:
         from the elevator (1/s, default 3 and 2).  Lower: more protection, and climbs less steeply when slow; higher:
         surges
     recovery_sink_m_s : sink demand at `least_airspeed` (m/s, default 1).  Higher: faster recovery, more height lost
+    pitch_per_excess_rad_s_m : pitch per excess of the airspeed without a height (rad s/m, default 0.02).  Higher:
+        holds the speed more tightly, follows gusts
+    climb_per_excess : climb taken to be missing per excess of the airspeed without a height (default 0.5).  Higher:
+        learns pitch errors faster, then surges; 0: sinks or climbs by them
     pitch_trim_rad : pitch in level flight at cruise (rad, default 1 deg).  Higher: climbs until learnt
     pitch_limit_rad : largest pitch demand (rad, default 15 deg).  Higher: steeper, nearer the stall
     pitch_per_lift_rad : pitch change per lift coefficient relative to cruise (rad, default 4.6 deg).  Higher: more
@@ -99,6 +103,8 @@ class EnergyParams:
     climb_per_margin_1_s: float = 3.0
     climb_per_rough_margin_1_s: float = 2.0
     recovery_sink_m_s: float = 1.0
+    pitch_per_excess_rad_s_m: float = 0.02
+    climb_per_excess: float = 0.5
     pitch_trim_rad: float = math.radians(1.0)
     pitch_limit_rad: float = math.radians(15.0)
     pitch_per_lift_rad: float = math.radians(4.6)
@@ -274,6 +280,13 @@ def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def excess_airspeed(s):  # type: ignore[no-untyped-def]
+    """Airspeed beyond the desired one, m/s, 0 if unknown: measured, or from the elevator (`autopilot.lift`)."""
+    protected_m_s = airspeed_to_protect(s)
+    return protected_m_s - s.airspeed_wanted_m_s if math.isfinite(protected_m_s) else 0.0
+
+
+@kernel
 def most_climb(s, e):  # type: ignore[no-untyped-def]
     """Largest climb demand, m/s, that leaves the speed above the stall; infinite if the airspeed is unknown.
 
@@ -310,8 +323,10 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Pitch demand, rad, and throttle, 0..1, that reach and hold a height and the desired airspeed.
 
     The integrated climb error compensates pitch errors of the estimate, the integrated energy error a wrong throttle
-    trim; the second is frozen if the airspeed is unknown, as speed would change to compensate the first.  Without a
-    height: level flight.
+    trim; the second is frozen if the airspeed is unknown, as speed would change to compensate the first.
+
+    Without a height: level flight.  At the throttle of level flight an aeroplane that is too fast descends: the excess
+    of the airspeed takes the place of the missing climb.
 
     height_m : demanded   row : measured   p : record of AutopilotParams
     s : record with `climb_integral_rad`, `throttle_integral`, updated, and the results of `believe_airspeed`
@@ -334,7 +349,11 @@ def hold_height(height_m, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     pitch_rad = trim_rad + climb_m_s / (s.true_factor * s.airspeed_wanted_m_s) + s.climb_integral_rad
 
     if e.height_weight > 0.0:  # otherwise the climb follows from the speed
-        climb_missing_m_s = climb_m_s + sinking_m_s if math.isfinite(missing_m) else 0.0
+        climb_missing_m_s = climb_m_s + sinking_m_s
+        if not math.isfinite(missing_m):
+            excess_m_s = excess_airspeed(s)
+            pitch_rad += e.pitch_per_excess_rad_s_m * excess_m_s
+            climb_missing_m_s = e.climb_per_excess * excess_m_s
     else:
         climb_missing_m_s = climb_m_s
     if climb_m_s == most_m_s or most_m_s < 0.0:  # too slow: not a pitch error

@@ -52,7 +52,7 @@ completed one, in CIRCLE until the first fix.
 import math
 from dataclasses import dataclass
 
-from autopilot.energy import hold_height, level_flight
+from autopilot.energy import airspeed_to_protect, hold_height, least_airspeed, level_flight
 from autopilot.fence import FENCE_GLIDE, FENCE_LOITER, mind_fence
 from autopilot.guidance import gps_age, height, is_fix
 from autopilot.interface import (
@@ -303,6 +303,16 @@ def bank_for_turn(bank_rad, R_eb, omega_b_rad_s, s):  # type: ignore[no-untyped-
 
 
 @kernel
+def glide_pitch(s, p):  # type: ignore[no-untyped-def]
+    """Pitch demand, rad, without motor: that of the glide, with the pitch error learnt before; lower near the stall.
+
+    s : record of the height loop   p : record of AutopilotParams
+    """
+    slow_m_s = min(airspeed_to_protect(s) - least_airspeed(s, p.energy), 0.0)
+    return p.failsafe.glide_pitch_rad + s.climb_integral_rad + p.energy.pitch_per_excess_rad_s_m * slow_m_s
+
+
+@kernel
 def circle(mode, R_eb, omega_b_rad_s, row, s, p, dt_s):  # type: ignore[no-untyped-def]
     """Bank and pitch demand, rad, and throttle of CIRCLE, GLIDE, LEVEL and LAND, which do not navigate.
 
@@ -313,7 +323,7 @@ def circle(mode, R_eb, omega_b_rad_s, row, s, p, dt_s):  # type: ignore[no-untyp
     if bank_rad > 0.0 and not s.fixed:
         bank_rad = bank_for_turn(bank_rad, R_eb, omega_b_rad_s, s)
     if mode in (GLIDE, LAND):
-        return bank_rad, p.failsafe.glide_pitch_rad, 0.0
+        return bank_rad, glide_pitch(s, p), 0.0
     # The GPS climb rate corrects the pitch drift of the gyros; level flight without a height.
     height_m = math.nan
     if mode == LEVEL:

@@ -209,6 +209,27 @@ def test_hold_height_without_gps_is_level_flight_at_cruise():
     np.testing.assert_allclose(demand, (PARAMS.pitch_trim_rad, PARAMS.throttle_trim), rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("excess_m_s", [-2.0, 3.0])
+@pytest.mark.parametrize("measured", [False, True])
+def test_hold_height_without_gps_takes_speed_for_descent(excess_m_s, measured):
+    """Too fast at the throttle of level flight: it descends, so the nose goes up at once, and further as it lasts."""
+    s = state(CRUISE_M_S + excess_m_s, known=measured)
+    s["air_left_s"], s["lift_m_s"] = float(measured), 0.0 if measured else CRUISE_M_S + excess_m_s
+    row = row_of(valid=0)
+    first_rad, _ = hold_height(math.nan, row, s, record(), 0.0)
+    gain_m_s = 0.0
+    if measured:  # the energy loop answers as well
+        gain_m_s = -s["airspeed_m_s"] / G_M_S2 * PARAMS.gain_per_speed_1_s * excess_m_s
+    given_m_s = max(gain_m_s, (PARAMS.throttle_least - PARAMS.throttle_trim) / PARAMS.throttle_per_climb_s_m)
+    climb_rad = (1.0 - PARAMS.height_weight) * (given_m_s - gain_m_s) / CRUISE_M_S
+    expected_rad = PARAMS.pitch_trim_rad + climb_rad + PARAMS.pitch_per_excess_rad_s_m * excess_m_s
+    np.testing.assert_allclose(first_rad, expected_rad, rtol=0, atol=1e-9)
+    for _ in range(100):
+        hold_height(math.nan, row, s, record(), DT_S)
+    slope_rad = PARAMS.pitch_per_climb_rad_m * PARAMS.climb_per_excess * excess_m_s * 100 * DT_S
+    np.testing.assert_allclose(s["climb_integral_rad"], slope_rad, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize("slower_m_s", [-1.0, 1.0])
 def test_hold_height_throttle_takes_the_sum_and_pitch_the_height(slower_m_s):
     """On the height but too slow or fast: the throttle answers with V a / g, and the nose stays where it is."""

@@ -53,6 +53,11 @@ class Aboard:
             self.ticks += 1
         return commands
 
+    @property
+    def learnt_rad(self):
+        """The pitch error that the height loop has learnt."""
+        return self.autopilot.snapshot().memory["s"]["climb_integral_rad"][0]
+
     def modes(self, *args, **others):
         """The modes in force, each with how long it was, s."""
         found = []
@@ -87,7 +92,9 @@ def test_gps_silent_circle_is_gentle_at_cruise_and_glide_is_without_motor():
     circle, glide = (next(c for c in reversed(commands) if c.mode == mode) for mode in (Mode.CIRCLE, Mode.GLIDE))
     assert circle.bank_demand_rad == glide.bank_demand_rad == P.bank_rad
     assert circle.throttle == EnergyParams().throttle_trim
-    assert (glide.throttle, glide.pitch_demand_rad) == (0.0, P.glide_pitch_rad)
+    assert glide.throttle == 0.0
+    assert glide.pitch_demand_rad == P.glide_pitch_rad + aboard.learnt_rad
+    assert aboard.learnt_rad == circle.pitch_demand_rad - EnergyParams().pitch_trim_rad != 0.0
 
 
 @pytest.mark.parametrize("mode", OTHERS)
@@ -445,7 +452,7 @@ def test_level_without_gps_lands():
     assert [m for m, _ in silent] == [Mode.LEVEL, Mode.LAND]
     np.testing.assert_allclose(silent[0][1], P.gps_lost_s + P.circle_s, rtol=0, atol=0.3)
     land = aboard.fly(asking(Mode.COURSE), DT_S, gps=False, estimate=poor())[-1]
-    assert land[3:] == (0.0, Mode.LAND, 0.0, P.glide_pitch_rad)
+    assert land[3:] == (0.0, Mode.LAND, 0.0, P.glide_pitch_rad + aboard.learnt_rad)
     back = aboard.modes(asking(Mode.COURSE), 10.0, estimate=poor())
     assert [m for m, _ in back] == [Mode.LAND, Mode.LEVEL]
 
