@@ -153,3 +153,12 @@ class BelievesEveryFix(DcmAutopilot):
         """As the sound one, which starts the comparison with this fix."""
         self._memory["s"]["watched"] = self._memory["s"]["gps_lost"] = 0
         return super().update(estimate, m, setpoint)
+
+
+class TrustsThePitch(DcmAutopilot):
+    """Without a GPS it flies at the pitch of level flight by the estimator, whatever the speed."""
+
+    def __init__(self, heading_reference: HeadingReference = "course", aircraft: str = "endurance") -> None:
+        params = params_of(aircraft)
+        energy = replace(params.energy, pitch_per_excess_rad_s_m=0.0, climb_per_excess=0.0)
+        super().__init__(replace(params, energy=energy), heading_reference, aircraft)

@@ -97,3 +97,13 @@ def test_drift_leads_the_aeroplane_away_and_the_attitude_stays():
     turn = slice(round((TO_S - 29.0) * 50), round(TO_S * 50))
     assert flight.log.truth["p_e_m"][turn, 0].mean() < -8.0  # the last circle lies south of it
     assert inclination_deg(flight)[round(FROM_S * 50) :].max() < 15.0
+
+
+@pytest.mark.parametrize(("changes", "survives"), [({}, True), ({"autopilot": f"{BROKEN}:TrustsThePitch"}, False)])
+def test_circle_is_held_by_the_speed_where_the_pitch_is_wrong(changes, survives):
+    """A minute without a GPS: the pitch of matrixpilot errs by 10 degrees."""
+    stuck = {"faults": "gps:stuck@60-120", "duration_s": 125.0}
+    flight = fly_scenario(CIRCLE, stuck | changes, seed=0, estimator="matrixpilot")
+    assert (flight.outcome == Outcome.COMPLETED) == survives
+    if survives:
+        assert -flight.log.truth["p_e_m"][:, 2].max() > 15.0  # 22 or more, of 80
