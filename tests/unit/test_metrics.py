@@ -190,6 +190,17 @@ def test_settling_time_counts_to_the_last_crossing():
     assert measured.value == pytest.approx(7.0, rel=0, abs=1.5 * DT_S)
 
 
+@pytest.mark.parametrize(("slow", "expected_s"), [((9.0, 12.0), 4.0), ((0.0, 6.0), 6.0), ((18.0, 99.0), math.nan)])
+def test_settling_time_ignores_what_is_not_judged(slow, expected_s):
+    """Too slow for a course: no sign of an error; but nothing is settled before it is judged, or by the end."""
+    flight = made_up(20.0)
+    t_s = since_release_s(flight)
+    flight.log.flown["R_eb"] = attitudes(np.where(t_s < 4.0, 30.0, 1.0), n=len(t_s))
+    flight.log.truth["v_e_m_s"][(t_s > slow[0]) & (t_s < slow[1])] = 0.0
+    value = settling(heading_error_deg("course"), 15.0)(flight).value
+    np.testing.assert_allclose(value, expected_s, rtol=0, atol=1.5 * DT_S)
+
+
 def test_settling_time_of_what_never_settles_is_not_a_number():
     """Above the limit in the last tick: not settled."""
     flight = made_up(20.0)

@@ -267,15 +267,17 @@ def over(
 def settled_after_s(series: Series, limit: float) -> float:
     """Time from the start of `series` until the value stays at or below `limit`; NaN if it never does.
 
-    Ticks that are not judged count as above the limit.
+    It counts to the first tick that is judged and good after the last one that is judged and is not.  Ticks that are not
+    judged in between, as those of a course over ground too slow to have one, say nothing; at the end they are NaN.
     """
     if len(series.t_s) == 0:
         return math.nan
     good = series.judged & (series.value <= limit)
     if not good[-1]:
         return math.nan
-    bad = np.flatnonzero(~good)
-    return float(series.t_s[bad[-1] + 1] - series.t_s[0]) if len(bad) else 0.0
+    bad = np.flatnonzero(series.judged & ~good)
+    after = bad[-1] + 1 if len(bad) else 0
+    return float(series.t_s[after + np.argmax(good[after:])] - series.t_s[0])
 
 
 def settling(series: SeriesOf, limit: float, from_: Moment = start, to: Moment = end) -> Metric:
