@@ -267,8 +267,8 @@ def over(
 def settled_after_s(series: Series, limit: float) -> float:
     """Time from the start of `series` until the value stays at or below `limit`; NaN if it never does.
 
-    It counts to the first tick that is judged and good after the last one that is judged and is not.  Ticks that are not
-    judged in between, as those of a course over ground too slow to have one, say nothing; at the end they are NaN.
+    It counts to the first tick that is judged and good after the last one that is judged and is not.  Ticks that are
+    not judged say nothing, as where the ground speed is too low for a course; at the end they are NaN.
     """
     if len(series.t_s) == 0:
         return math.nan
