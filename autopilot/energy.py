@@ -281,9 +281,13 @@ def airspeed_to_protect(s):  # type: ignore[no-untyped-def]
 
 @kernel
 def excess_airspeed(s):  # type: ignore[no-untyped-def]
-    """Airspeed beyond the desired one, m/s, 0 if unknown: measured, or from the elevator (`autopilot.lift`)."""
-    protected_m_s = airspeed_to_protect(s)
-    return protected_m_s - s.airspeed_wanted_m_s if math.isfinite(protected_m_s) else 0.0
+    """Airspeed beyond the desired one, at least 0, m/s; 0 if unknown.
+
+    Measured, or from the elevator (`autopilot.lift`).  Below it, the motor may be weak: that is for the guard
+    against a stall.
+    """
+    flown_m_s = airspeed_to_protect(s)
+    return max(flown_m_s - s.airspeed_wanted_m_s, 0.0) if math.isfinite(flown_m_s) else 0.0
 
 
 @kernel

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
+from estimator.blocks.air import true_over_equivalent
 from estimator.interface import G_M_S2, Array
 from estimator.rotation import from_euler
 from sim.clock import Rates
@@ -413,9 +414,10 @@ def swing(devices: Mapping[str, Any]) -> Log:
 
 
 def air_errors(log: Log, kind: str) -> Array:
-    """Reading minus truth of each sample of `swing`, m/s or m."""
+    """Reading minus truth, equivalent airspeed or height, of each sample of `swing`, m/s or m."""
     new = log.measured["air_new"] == 1
     truth, measured = log.truth[new], log.measured[new]
     if kind == "airspeed":
-        return np.asarray(measured["equivalent_airspeed_m_s"] - truth["airspeed_m_s"])
+        factor = [true_over_equivalent(ELEVATION_M - down_m) for down_m in truth["p_e_m"][:, 2]]
+        return np.asarray(measured["equivalent_airspeed_m_s"] - truth["airspeed_m_s"] / factor)
     return np.asarray(measured["baro_height_m"] + truth["p_e_m"][:, 2])

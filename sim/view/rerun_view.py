@@ -60,7 +60,7 @@ _LANE_COLOURS: dict[str, dict[str, Colour]] = {
     "mode": {
         "manual": _IDLE, "rate": (110, 105, 130), "stabilise": (60, 95, 140), "course": (45, 110, 90), "return": _OK,
         "launch": (45, 110, 125), "loiter": (70, 120, 60), "waypoints": (60, 125, 100), "circle": _WARNING,
-        "glide": (170, 105, 40), "level": _ALARM, "low": (200, 120, 60),
+        "glide": (170, 105, 40), "level": _ALARM, "low": (200, 120, 60), "land": (140, 45, 70),
     },
     "estimator": {"starting": _IDLE, "good": _OK, "poor": _ALARM},
 }  # fmt: skip

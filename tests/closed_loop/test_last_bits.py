@@ -14,13 +14,13 @@ SEEDS = (0, 1)
 
 
 def flown(name: str, seed: int, last_bits: int) -> Verdict:
-    """The verdict on one flight that starts higher by so many of the last bits of its height."""
+    """The verdict on one flight that starts with so many of the last bits of its heading more."""
     scenario = find(name)
     config = resolve(scenario.config.model_copy(update={"seed": seed}))
-    height_m = config.start.height_m
+    heading_deg = config.heading_deg
     if last_bits:
-        height_m = math.nextafter(height_m, math.copysign(math.inf, last_bits))
-    start = config.start.model_copy(update={"height_m": height_m})
+        heading_deg = math.nextafter(heading_deg, math.copysign(math.inf, last_bits))
+    start = config.start.model_copy(update={"heading_deg": heading_deg})
     flight = fly_config(scenario, config.model_copy(update={"start": start}))
     return Verdict.of([(scenario, judge(scenario, flight))])
 

@@ -25,7 +25,7 @@ def endurance():
 def believed(aircraft, airspeed_m_s, *, inverted=0):
     p, s = np.zeros(1, _PARAMS["energy"]), np.zeros(1, _STATE)[0]
     p[0] = astuple(params_of(aircraft).energy)
-    s["airspeed_wanted_m_s"], s["inverted"] = airspeed_m_s, inverted
+    s["airspeed_wanted_m_s"], s["inverted"], s["true_factor"] = airspeed_m_s, inverted, 1.0
     return level_flight(s, p[0])
 
 

@@ -49,7 +49,7 @@ class Weaving:
     phase = Phase.FLYING
 
     def at(self, t_s):
-        """See `Motion.at`; the position, which no one reads, stays where it is."""
+        """See `Motion.at`; the position is left to `fly`."""
         w, V = 2.0 * np.pi / self.period_s, self.airspeed_m_s
         s, c = np.sin(w * t_s), np.cos(w * t_s)
         chi = self.heading_rad + self.rate_rad_s / w * (2.0 / 3.0 - c + c**3 / 3.0)
@@ -102,6 +102,7 @@ def fly(seed):
         sideslip_phase_rad=rng.uniform(0.0, 2.0 * np.pi),
     )
     log.truth[:] = motion_rows(motion, len(log), rates.dt_s, math.radians(LATITUDE_DEG))
+    log.truth["p_e_m"] = np.cumsum(log.truth["v_e_m_s"], axis=0) * rates.dt_s  # or its fixes could not be true
     latency_s = (
         round(float(np.clip(rng.normal(ASSUMED_S, LATENCY_SIGMA_S), 0.02, 1.0)) * rates.physics_hz) / rates.physics_hz
     )

@@ -209,17 +209,21 @@ def test_hold_height_without_gps_is_level_flight_at_cruise():
     np.testing.assert_allclose(demand, (PARAMS.pitch_trim_rad, PARAMS.throttle_trim), rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("excess_m_s", [-2.0, 3.0])
+@pytest.mark.parametrize(("faster_m_s", "excess_m_s"), [(3.0, 3.0), (-2.0, 0.0)])
 @pytest.mark.parametrize("measured", [False, True])
-def test_hold_height_without_gps_takes_speed_for_descent(excess_m_s, measured):
-    """Too fast at the throttle of level flight: it descends, so the nose goes up at once, and further as it lasts."""
-    s = state(CRUISE_M_S + excess_m_s, known=measured)
-    s["air_left_s"], s["lift_m_s"] = float(measured), 0.0 if measured else CRUISE_M_S + excess_m_s
+def test_hold_height_without_gps_takes_speed_for_descent(faster_m_s, excess_m_s, measured):
+    """Too fast at the throttle of level flight: it descends, so the nose goes up at once, and further as it lasts.
+
+    Slower than cruise, the motor may be weak: no reason to dive.
+    """
+    s = state(CRUISE_M_S + faster_m_s, known=measured)
+    s["air_left_s"], s["lift_m_s"] = float(measured), 0.0 if measured else CRUISE_M_S + faster_m_s
     row = row_of(valid=0)
     first_rad, _ = hold_height(math.nan, row, s, record(), 0.0)
     gain_m_s = 0.0
     if measured:  # the energy loop answers as well
-        gain_m_s = -s["airspeed_m_s"] / G_M_S2 * PARAMS.gain_per_speed_1_s * excess_m_s
+        gain_m_s2 = np.clip(-PARAMS.gain_per_speed_1_s * faster_m_s, -PARAMS.gain_limit_m_s2, PARAMS.gain_limit_m_s2)
+        gain_m_s = s["airspeed_m_s"] / G_M_S2 * gain_m_s2
     given_m_s = max(gain_m_s, (PARAMS.throttle_least - PARAMS.throttle_trim) / PARAMS.throttle_per_climb_s_m)
     climb_rad = (1.0 - PARAMS.height_weight) * (given_m_s - gain_m_s) / CRUISE_M_S
     expected_rad = PARAMS.pitch_trim_rad + climb_rad + PARAMS.pitch_per_excess_rad_s_m * excess_m_s

@@ -259,6 +259,6 @@ def test_check_of_nothing_but_failures_to_show_is_refused(capfd) -> None:
 def test_check_of_a_pattern_flies_the_family() -> None:
     """Whatever the scenario's own estimator, where none is named."""
     flown = [task.scenario for task in gate.tasks(["turns_180*", "turns_180"], [0, 1], None, {})]
-    assert flown[::2] == ["turns_180", "turns_180_bank_30", "turns_180_bank_45", "turns_180_bank_60"]
+    assert flown[::2] == ["turns_180", "turns_180_bank_30", "turns_180_bank_45", "turns_180_bank_60", "turns_180_high"]
     assert flown[::2] == flown[1::2]
     assert {task.scenario for task in gate.tasks(["hand_launch*"], [0], None, {})} >= {"hand_launch_accelerometer"}

@@ -88,9 +88,9 @@ def test_autopilot_speeds_are_equivalent_and_its_triangles_true():
     s.air_left_s = 0.0
     believe_airspeed(STILL, row, s, p, 1e9)
     assert s.airspeed_m_s == pytest.approx(12.0, rel=1e-6)
-    believe_headwind(1.0, 0.0, unknown, row, s, p, 1e9)
+    believe_headwind(1.0, 0.0, False, unknown, row, s, p, 1e9)
     assert s.headwind_m_s == pytest.approx(0.0, abs=1e-5)
-    north, east = direction_of_travel(np.eye(3), np.array([0.0, 5.0, 0.0]), row, s, True, p.guidance)
+    north, east = direction_of_travel(np.eye(3), np.array([0.0, 5.0, 0.0]), row, s, True, False, p.guidance)
     assert math.atan2(east, north) == pytest.approx(math.atan2(5.0, factor * 12.0), rel=1e-6)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from estimator.blocks.air import true_over_equivalent
 from sim.clock import Rates
 from sim.log import Log
 from sim.sensors.air_data import AirspeedParams, BarometerParams
@@ -27,7 +28,8 @@ def test_fitted_sensors_are_drawn_from_their_first_sample_on():
     for i, axis in enumerate("xyz"):
         assert np.all(np.isnan(lines[f"field/{axis}"][:4]))
         np.testing.assert_array_equal(lines[f"field/{axis}"][4:, 0], log.measured["mag_b_ut"][4:, i])
-    np.testing.assert_allclose(lines["flight/speed"][4:, 1], 12.0, rtol=0, atol=1e-12)
+    equivalent_m_s = 12.0 / true_over_equivalent(30.0)
+    np.testing.assert_allclose(lines["flight/speed"][4:, 1], equivalent_m_s, rtol=0, atol=1e-12)
     assert np.all(np.isnan(lines["flight/height"][:, 1]))  # no barometer
     assert {"field/x", "field/y", "field/z"} <= limits(log, lines).keys()
 
