@@ -180,7 +180,8 @@ def reckon_speed(wind_e_m_s, row, me, dt_s):  # type: ignore[no-untyped-def]
     travels = s.led_by in (COURSE, RETURN, LOITER, WAYPOINTS)
     if travels:
         towards_north, towards_east = way_wanted(me.setpoint, row, s, me.p.guidance)
-        believe_headwind(towards_north, towards_east, s.led_by in (LOITER, WAYPOINTS), wind_e_m_s, row, s, me.p, dt_s)
+        circles = s.led_by in (LOITER, WAYPOINTS) and e.throttle_per_climb_s_m > 0.0  # a sailplane pays with height
+        believe_headwind(towards_north, towards_east, circles, wind_e_m_s, row, s, me.p, dt_s)
     want_airspeed(me.setpoint, travels, s, e)
     believe_airspeed(wind_e_m_s, row, s, me.p, dt_s)
 

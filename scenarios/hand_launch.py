@@ -80,7 +80,7 @@ SCENARIOS = (
         {"estimator": "accelerometer_only"},
         expected_to_fail=True,
         checks=(
-            Check("pitch when it hits the ground", "deg", pitch_at_ground_deg, -20.0),
+            Check("pitch when it hits the ground", "deg", pitch_at_ground_deg, -15.0),
             Check("time to the ground", "s", ground_contact_s, 3.0),
             Check("highest pitch believed", "deg", over(believed_pitch_deg, highest, start, last), 45.0, ">="),
         ),
