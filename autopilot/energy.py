@@ -189,8 +189,8 @@ def believe_headwind(towards_north, towards_east, circles, wind_e_m_s, row, s, p
     visible across the wind.  On a circle or a route the whole wind counts, whatever the present track: who flies
     slowly with it is carried away before he has turned.
 
-    towards_north, towards_east : unit vector, or (0, 0) for the present track   circles : on a circle or a route, with a motor
-    wind_e_m_s : shape (3,) or NaN
+    towards_north, towards_east : unit vector, or (0, 0) for the present track
+    circles : on a circle or a route, with a motor   wind_e_m_s : shape (3,) or NaN
     row : measured   p : record of AutopilotParams   s : record with `ground_m_s` (NaN: unknown) and `headwind_m_s`
     """
     now_m_s, lag_s = 0.0, gps_age(row, p.guidance)
