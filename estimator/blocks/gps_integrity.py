@@ -12,7 +12,8 @@ Only horizontally: many receivers report no vertical velocity.  A fix is refused
 - if it is *frozen*: the position repeats to the last bit while the reported speed has covered 3 m, or position and
   velocity repeat for 2 s while the speed is not zero.  Frozen for 1 s, the GPS is lost.  A receiver at rest that holds
   its position reports a speed of zero and is not frozen;
-- if its course repeats to the last bit while the gyros have seen a turn of 15 degrees; 0.75 s later the GPS is lost;
+- if its course repeats to the last bit while the gyros have seen a turn of 15 degrees, and the position has left it by
+  2 m, without which that may be an offset of the gyros; 0.75 s later the GPS is lost, for as long as the turn lasts;
 - while the GPS is *lost*: also if ``|r|`` exceeds its limit, when the velocity is frozen, or its course, and the
   aeroplane turns.  It is found again by consistent fixes for 2 s.
 
@@ -56,6 +57,7 @@ CLEAR_S = 2.0  # consistent fixes for this long end the loss
 ROUND_OFF_S = 1e-6
 STRAIGHT = 1e-6  # sine of a change of direction that is none
 TURNED_RAD, TURNING_M_S = math.radians(15.0), 3.0  # turn that a course must follow, at a speed that has one
+IGNORED_M = 2.0  # |r| without which the turn may be an offset of the gyros
 IGNORED_S = 0.75  # time for which it has not followed a larger one until the GPS is lost
 MOST_M, MOST_M_S, MOST_RAD_S = 1e7, 1e4, 10.0  # limits of what is compared
 
@@ -103,7 +105,7 @@ def watch(row, turn_rad_s, s):  # type: ignore[no-untyped-def]
     interval_s, reach_s = row.t_s - s.came_s, row.t_s - s.base_s
     follows = s.watched != 0 and 0.0 < interval_s <= LONGEST_INTERVAL_S
     frozen = is_frozen(row, s, interval_s) if follows else repeats(row, s)
-    if follows and ignores_turn(row, turn_rad_s, s, interval_s):
+    if follows and ignores_turn(row, turn_rad_s, s, interval_s, reach_s):
         frozen = True
     held = s.came_v_e_m_s[0] == 0.0 and s.came_v_e_m_s[1] == 0.0 and moves(row)
     s.watched = 1
@@ -167,7 +169,18 @@ def keeps_course(v, w):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def ignores_turn(row, turn_rad_s, s, interval_s):  # type: ignore[no-untyped-def]
+def leaves_course(row, s, reach_s):  # type: ignore[no-untyped-def]
+    """Whether the position leaves the course that is reported: |r| with this fix."""
+    if not 0.0 < reach_s <= LONGEST_REACH_S:
+        return False
+    dt_s = since_base(row, s, reach_s)
+    keep, r = np.exp(-dt_s / MEMORY_S), s.strayed_m
+    strayed_m = np.hypot(keep * r[0] + unexplained(row, s, dt_s, 0), keep * r[1] + unexplained(row, s, dt_s, 1))
+    return strayed_m > IGNORED_M
+
+
+@kernel
+def ignores_turn(row, turn_rad_s, s, interval_s, reach_s):  # type: ignore[no-untyped-def]
     """Whether the course has not changed in a turn."""
     v = row.gps_v_e_m_s
     if not (keeps_course(v, s.came_v_e_m_s) and np.hypot(v[0], v[1]) >= TURNING_M_S and abs(turn_rad_s) < MOST_RAD_S):
@@ -175,7 +188,7 @@ def ignores_turn(row, turn_rad_s, s, interval_s):  # type: ignore[no-untyped-def
         return False
     ignored = abs(s.ignored_rad) > TURNED_RAD
     s.ignored_rad += turn_rad_s * interval_s
-    ignores = abs(s.ignored_rad) > TURNED_RAD
+    ignores = abs(s.ignored_rad) > TURNED_RAD and (s.gps_lost != 0 or leaves_course(row, s, reach_s))
     s.steady_s = s.steady_s + interval_s if ignored and ignores else 0.0
     return ignores
 
