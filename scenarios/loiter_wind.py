@@ -3,7 +3,7 @@
 =============  ===================================================================================================
 Story          Above the launch point, heading unknown to the estimator, it is commanded to circle there with a radius
                of 60 m.  At cruise it would stand still into the wind and fly twice as fast with it: the course over
-               ground swings round in seconds, or backwards, and whoever follows it is carried off.
+               ground swings round in seconds, or backwards, and an autopilot that follows it is carried off.
 Verifies       circles in wind (Park, Deyst & How, with the ground speed): the autopilot flies faster, and takes its
                direction in the turn from the GPS velocity less the wind
 Aircraft       endurance

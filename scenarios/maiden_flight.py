@@ -1,7 +1,7 @@
 """First flight of a model that is a tenth too heavy, tail-heavy and not trimmed.
 
 =============  ===================================================================================================
-Story          Nobody has weighed it or trimmed it, and the autopilot has the gains of the drawing.  The ailerons are
+Story          It was neither weighed nor trimmed, and the autopilot has the gains of the drawing.  The ailerons are
                off by 20 % of their deflection and roll it to the right, the elevator by 10 % and pushes the nose down.
                Thrown from the hand, a little harder for its weight, it climbs; 25 s after the release it is commanded
                onto the course of the throw.
