@@ -82,6 +82,6 @@ def test_throw_impossible_is_rejected_in_one_line(name, value, right):
 @pytest.mark.parametrize("seed", [7, 9])
 @pytest.mark.parametrize(("learn_held_s", "outcome"), [(20.0, Outcome.COMPLETED), (0.0, Outcome.GROUND_CONTACT)])
 def test_throw_without_calibration_needs_the_offset_learnt_in_the_hand(seed, learn_held_s, outcome):
-    """An offset of 2.5 deg/s about the pitch axis, held for 8 s: the slow loop alone comes too late."""
+    """Held for 8 s with an offset of some degrees per second: the slow loop alone comes too late."""
     changes = {"estimator_params.learn_held_s": learn_held_s, "duration_s": 15.0}
     assert fly_scenario(find("cold_start"), changes, seed=seed).outcome is outcome
