@@ -203,7 +203,7 @@ def claims(
 
 
 def agree(
-    first: AnyPath, second: AnyPath, *, tolerance: float = 0.05, report_only: str | Sequence[str] = "faults"
+    first: AnyPath, second: AnyPath, *, tolerance: float = 0.05, report_only: str | Sequence[str] = "faults,motor_dead*"
 ) -> Report:
     """Compare what ``check --json`` wrote on two machines: same flights, same outcomes, values within a tolerance.
 

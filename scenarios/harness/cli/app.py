@@ -205,7 +205,7 @@ def agree(
     report_only: Annotated[
         str,
         typer.Option(metavar="NAME,...", help="Scenarios or patterns whose values are not judged, or 'none'."),
-    ] = "faults",
+    ] = "faults,motor_dead*",
     json_: JsonOption = None,
 ) -> int:
     """Compare the verdicts of two machines: the same flights, the same outcomes, values within a tolerance."""
