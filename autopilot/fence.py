@@ -32,7 +32,7 @@ FENCE_LOITER, FENCE_GLIDE, FENCE_REPORT = (int(a) for a in (FenceAction.LOITER, 
 
 @dataclass(frozen=True, slots=True)
 class FenceParams:
-    """The fence; by default there is none.  ValueError for one that is too small to fly in.
+    """The fence; the default is no fence.  ValueError if it is too small to fly in.
 
     radius_m : from the launch point, at least 50 (m, default inf).  Higher: flies further out
     height_m : ceiling above the launch point, at least 45 (m, default inf).  Higher: flies higher

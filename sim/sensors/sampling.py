@@ -91,7 +91,7 @@ def samples_of(
         t_s = rates.dt_s * np.arange(1, n + 1) - release_s
         within = (t_s >= fault.from_s - 1e-9) & (t_s < fault.to_s - 1e-9)
         samples["lost"] |= within & (source(f"fault {fault}").random(n) < fault.values[0])
-    samples["lost"][:1] = 0  # there is none to repeat
+    samples["lost"][:1] = 0  # the first row has no row before it to repeat
     return samples
 
 

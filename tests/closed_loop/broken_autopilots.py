@@ -38,7 +38,7 @@ class ClimbsOn(DcmAutopilot):
 
 
 class FliesThroughTheFence(DcmAutopilot):
-    """Is told of a fence, and forgets it."""
+    """Receives a fence, and ignores it."""
 
     def __init__(
         self, heading_reference: HeadingReference = "course", aircraft: str = "endurance", fence: object = None

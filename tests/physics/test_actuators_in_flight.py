@@ -73,7 +73,7 @@ def test_dead_motor_gives_no_thrust_and_a_weak_one_less():
 
 
 def test_fault_that_never_begins_changes_no_bit():
-    """Whoever has no fault flies what was flown before there were any."""
+    """Faults that begin after the end leave the flight unchanged, to the last bit."""
     sound, _ = flown(command=step(0))
     never, _ = flown("aileron:reversed@900", "motor:dead@900", command=step(0))
     assert sound.tobytes() == never.tobytes()

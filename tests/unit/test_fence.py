@@ -1,4 +1,4 @@
-"""The geofence: what is accepted, who is told of it, and one tick at a time."""
+"""The geofence: accepted values, which autopilots receive it, and single ticks."""
 
 import math
 
@@ -113,7 +113,7 @@ def test_fence_loiter_and_glide_last_until_another_setpoint(action, mode):
 
 @pytest.mark.parametrize("mode", [m for m in Mode if m <= Mode.WAYPOINTS and m != Mode.LAUNCH])
 def test_fence_overrides_all_but_sticks_and_return(mode):
-    """Rates and sticks are the pilot's; whoever comes home already does so."""
+    """MANUAL and RATE belong to the pilot; RETURN is on its way home already."""
     setpoint = Setpoint(mode, route=((0.0, 0.0, 60.0),), height_m=60.0)
     kept = mode in (Mode.MANUAL, Mode.RATE, Mode.RETURN)
     assert mode_at(fenced(), 350.0, setpoint=setpoint) == (mode if kept else Mode.RETURN)

@@ -211,3 +211,11 @@ def test_autopilot_sees_every_column_except_a_fix_that_cannot_be_true():
         else:
             sound = seen.copy()
     assert held_back
+
+
+@pytest.mark.parametrize("hz", HZ)
+def test_offset_of_the_gyros_in_perfect_straight_flight_is_no_frozen_course(hz):
+    """A course without noise repeats to the last bit; the gyros see a turn of 3 deg/s that is none."""
+    sound, lost = watched(circle(hz, turn_rad_s=0.0, noise=0.0), np.radians(3.0))
+    assert sound.all()
+    assert not lost.any()

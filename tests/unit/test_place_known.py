@@ -1,4 +1,4 @@
-"""The launch place in the configuration, and who is told its elevation."""
+"""The launch place in the configuration, and which code receives its elevation."""
 
 import math
 from dataclasses import replace

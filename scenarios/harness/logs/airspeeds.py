@@ -17,7 +17,7 @@ def equivalent_m_s(true_m_s: Array, height_m: Array | float) -> Array:
 
 
 def elevation(altitude_m: float | None, why: str) -> dict[str, Known]:
-    """``elevation_m`` by the altitude of the first fix; nothing if there is none on earth."""
+    """``elevation_m`` by the altitude of the first fix; nothing if that is not a height on earth."""
     if altitude_m is None or not DEEPEST_M <= altitude_m <= HIGHEST_M:
         return {}
     return {"elevation_m": Known(float(altitude_m), "log", why)}
